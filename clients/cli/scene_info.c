@@ -1,0 +1,28 @@
+/* A scene file described as the daemon describes its scenes. */
+#include "clients/cli/scene_info.h"
+
+#include "clients/cli/command.h"
+
+enum lp_code scene_info_open(struct bake_scene *out, struct lp_scene_file *file, const char *path,
+                             struct lp_error *err)
+{
+    struct lp_scene_file opened = {0};
+    enum lp_code code = lp_scene_file_open(&opened, path, LP_TRUST_NOTHING, err);
+    if (code != LP_OK)
+        return code;
+    lp_scene_file_close(&opened);
+    double start = command_seconds();
+    code = lp_scene_file_open(&opened, path, LP_TRUST_CONTENT, err);
+    if (code != LP_OK)
+        return code;
+    double open_s = command_seconds() - start;
+    uint8_t digest[LP_SHA256_BYTES];
+    lp_sha256(digest, opened.map, opened.bytes);
+    bake_scene_describe(out, &opened);
+    (void)command_scene_name(out->scene.name, path);
+    bake_hex(out->scene.sha256, digest);
+    out->scene.refs = 0;
+    out->scene.open_s = open_s;
+    *file = opened;
+    return LP_OK;
+}

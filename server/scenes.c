@@ -1,0 +1,420 @@
+/* The scenes that can be rendered: names, states, and the reference-counted resident set. */
+#include "server/scenes.h"
+
+#include "server/clock.h"
+#include "server/log.h"
+#include "server/scenes_private.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/eventfd.h>
+#include <sys/inotify.h>
+#include <unistd.h>
+
+/* ---- life -------------------------------------------------------------------------------------- */
+
+static void scenes_free(struct scenes *scenes)
+{
+    for (size_t i = 0; i < scenes->count; i++)
+        free(scenes->entries[i]);
+    for (struct scene *scene = scenes->residents, *next; scene; scene = next) {
+        next = scene->next;
+        lp_scene_file_close(&scene->file);
+        free(scene);
+    }
+    scene_store_destroy(&scenes->store);
+    if (scenes->inotify_fd >= 0)
+        close(scenes->inotify_fd);
+    if (scenes->event_fd >= 0)
+        close(scenes->event_fd);
+    pthread_mutex_destroy(&scenes->mutex);
+    free(scenes);
+}
+
+enum lp_code scenes_start(struct scenes **out, const struct data_dir *dir, int wake_fd,
+                          struct lp_error *err)
+{
+    struct scenes *scenes = calloc(1, sizeof *scenes);
+    if (!scenes)
+        return lp_fail(err, LP_NO_MEMORY, "scenes", "no memory for the scenes");
+    scenes->dir = dir;
+    scenes->wake_fd = wake_fd;
+    pthread_mutex_init(&scenes->mutex, NULL);
+    scenes->event_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    /* Without inotify (its watches are limited) the regular look every two seconds remains. */
+    scenes->inotify_fd = inotify_init1(IN_CLOEXEC | IN_NONBLOCK);
+    scenes->store = scene_store_create(dir, &scenes->stop);
+    enum lp_code code = LP_OK;
+    int failed = 0;
+    if (!scenes->store || scenes->event_fd < 0)
+        code = lp_fail(err, LP_NO_MEMORY, "scenes", "the scenes cannot be watched");
+    else if ((failed = pthread_create(&scenes->thread, NULL, scenes_main, scenes)))
+        code = lp_fail(err, LP_NO_MEMORY, "scenes", "its thread cannot be started: %s",
+                       strerror(failed));
+    if (code) {
+        scenes_free(scenes);
+        return code;
+    }
+    *out = scenes;
+    return LP_OK;
+}
+
+static void scenes_nudge(const struct scenes *scenes)
+{
+    uint64_t one = 1;
+    (void)!write(scenes->event_fd, &one, sizeof one);
+}
+
+void scenes_stop(struct scenes *scenes)
+{
+    atomic_store(&scenes->stop, true);
+    scenes_nudge(scenes);
+}
+
+bool scenes_join(struct scenes **pointer, uint64_t until_ns)
+{
+    struct scenes *scenes = *pointer;
+    if (!scenes)
+        return true;
+    struct timespec until = {.tv_sec = (time_t)(until_ns / CLOCK_NS_PER_S),
+                             .tv_nsec = (long)(until_ns % CLOCK_NS_PER_S)};
+    if (pthread_clockjoin_np(scenes->thread, NULL, CLOCK_MONOTONIC, &until) != 0)
+        return false;
+    scenes_free(scenes);
+    *pointer = NULL;
+    return true;
+}
+
+bool scenes_scanned(const struct scenes *scenes)
+{
+    return atomic_load(&scenes->scanned);
+}
+
+/* ---- names ------------------------------------------------------------------------------------- */
+
+/* Where `name` is or would be. With the mutex held (or on the thread that writes). */
+static size_t entry_place(const struct scenes *scenes, const char *name, bool *there)
+{
+    size_t low = 0, high = scenes->count;
+    *there = false;
+    while (low < high) {
+        size_t middle = (low + high) / 2;
+        int order = strcmp(scenes->entries[middle]->name, name);
+        if (order == 0) {
+            *there = true;
+            return middle;
+        }
+        if (order < 0)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+static struct scene_entry *entry_find(const struct scenes *scenes, const char *name)
+{
+    bool there;
+    size_t at = entry_place(scenes, name, &there);
+    return there ? scenes->entries[at] : NULL;
+}
+
+struct scene_entry *scenes_entry(struct scenes *scenes, const char *name)
+{
+    pthread_mutex_lock(&scenes->mutex);
+    struct scene_entry *entry = entry_find(scenes, name);
+    pthread_mutex_unlock(&scenes->mutex);
+    return entry;
+}
+
+struct scene_entry *scenes_entry_add(struct scenes *scenes, const char *name)
+{
+    struct scene_entry *entry = calloc(1, sizeof *entry);
+    if (!entry)
+        return NULL;
+    memcpy(entry->name, name, strlen(name) + 1);
+    entry->state = WIRE_SCENE_LOADING;
+    pthread_mutex_lock(&scenes->mutex);
+    bool there, full = scenes->count == SCENES_MAX;
+    size_t at = entry_place(scenes, name, &there);
+    if (!full) {
+        memmove(&scenes->entries[at + 1], &scenes->entries[at],
+                (scenes->count - at) * sizeof scenes->entries[0]);
+        scenes->entries[at] = entry;
+        scenes->count++;
+    }
+    pthread_mutex_unlock(&scenes->mutex);
+    if (full) {
+        free(entry);
+        return NULL;
+    }
+    return entry;
+}
+
+void scenes_entry_remove(struct scenes *scenes, struct scene_entry *entry)
+{
+    pthread_mutex_lock(&scenes->mutex);
+    bool there;
+    size_t at = entry_place(scenes, entry->name, &there);
+    if (entry->scene)
+        entry->scene->names--;
+    memmove(&scenes->entries[at], &scenes->entries[at + 1],
+            (scenes->count - at - 1) * sizeof scenes->entries[0]);
+    scenes->count--;
+    pthread_mutex_unlock(&scenes->mutex);
+    free(entry);
+}
+
+void scenes_names(struct scenes *scenes, char *out, size_t room)
+{
+    size_t used = 0;
+    out[0] = 0;
+    pthread_mutex_lock(&scenes->mutex);
+    for (size_t i = 0; i < scenes->count; i++) {
+        const char *name = scenes->entries[i]->name;
+        size_t n = strlen(name);
+        if (used + n + 8 > room) {
+            snprintf(out + used, room - used, ", ...");
+            break;
+        }
+        int got = snprintf(out + used, room - used, "%s%s", used ? ", " : "", name);
+        used += got > 0 ? (size_t)got : 0;
+    }
+    pthread_mutex_unlock(&scenes->mutex);
+}
+
+/* ---- publishing -------------------------------------------------------------------------------- */
+
+/* With the mutex held. */
+static void entry_show(struct scene_entry *entry, struct scene *scene)
+{
+    if (entry->scene)
+        entry->scene->names--;
+    scene->names++;
+    entry->scene = scene;
+    entry->state = WIRE_SCENE_READY;
+    entry->reason[0] = 0;
+}
+
+/* With the mutex held. */
+static struct scene *resident_find(const struct scenes *scenes, const char *sha256)
+{
+    struct scene *scene = scenes->residents;
+    while (scene && strcmp(scene->about.scene.sha256, sha256) != 0)
+        scene = scene->next;
+    return scene;
+}
+
+bool scenes_publish_resident(struct scenes *scenes, struct scene_entry *entry, const char *sha256)
+{
+    pthread_mutex_lock(&scenes->mutex);
+    struct scene *scene = resident_find(scenes, sha256);
+    if (scene)
+        entry_show(entry, scene);
+    pthread_mutex_unlock(&scenes->mutex);
+    return scene != NULL;
+}
+
+bool scenes_publish(struct scenes *scenes, struct scene_entry *entry, struct lp_scene_file *file,
+                    const char *sha256, double open_s)
+{
+    if (scenes_publish_resident(scenes, entry, sha256)) {
+        lp_scene_file_close(file);
+        return true;
+    }
+    struct scene *scene = calloc(1, sizeof *scene);
+    if (!scene) {
+        lp_scene_file_close(file);
+        return false;
+    }
+    scene->file = *file;
+    *file = (struct lp_scene_file){0};
+    bake_scene_describe(&scene->about, &scene->file);
+    memcpy(scene->about.scene.sha256, sha256, WIRE_SHA256_BYTES);
+    scene->about.scene.open_s = open_s;
+    pthread_mutex_lock(&scenes->mutex);
+    scene->next = scenes->residents;
+    scenes->residents = scene;
+    entry_show(entry, scene);
+    pthread_mutex_unlock(&scenes->mutex);
+    return true;
+}
+
+void scenes_fail(struct scenes *scenes, struct scene_entry *entry, const char *reason)
+{
+    pthread_mutex_lock(&scenes->mutex);
+    if (entry->scene)
+        entry->scene->names--;
+    entry->scene = NULL;
+    entry->state = WIRE_SCENE_FAILED;
+    snprintf(entry->reason, sizeof entry->reason, "%s", reason);
+    pthread_mutex_unlock(&scenes->mutex);
+}
+
+bool scenes_collect(struct scenes *scenes)
+{
+    struct scene *free_list = NULL;
+    pthread_mutex_lock(&scenes->mutex);
+    for (struct scene **at = &scenes->residents; *at;) {
+        struct scene *scene = *at;
+        if (scene->refs > 0 || scene->names > 0) {
+            at = &scene->next;
+            continue;
+        }
+        *at = scene->next;
+        scene->next = free_list;
+        free_list = scene;
+    }
+    pthread_mutex_unlock(&scenes->mutex);
+    bool some = free_list != NULL;
+    for (struct scene *scene = free_list, *next; scene; scene = next) {
+        next = scene->next;
+        log_event(LOG_INFO, "scene_closed", "sha256=%s bytes=%zu", scene->about.scene.sha256,
+                  scene->file.bytes);
+        lp_scene_file_close(&scene->file);
+        free(scene);
+    }
+    return some;
+}
+
+size_t scenes_resident_hashes(struct scenes *scenes, char (**out)[WIRE_SHA256_BYTES])
+{
+    /* Only this thread adds residents, so they cannot become more between the two looks. */
+    size_t room = 0, count = 0;
+    pthread_mutex_lock(&scenes->mutex);
+    for (const struct scene *scene = scenes->residents; scene; scene = scene->next)
+        room++;
+    pthread_mutex_unlock(&scenes->mutex);
+    *out = calloc(room ? room : 1, sizeof **out);
+    if (!*out)
+        return SIZE_MAX;
+    pthread_mutex_lock(&scenes->mutex);
+    for (const struct scene *scene = scenes->residents; scene && count < room; scene = scene->next)
+        memcpy((*out)[count++], scene->about.scene.sha256, WIRE_SHA256_BYTES);
+    pthread_mutex_unlock(&scenes->mutex);
+    return count;
+}
+
+/* ---- the loop's side --------------------------------------------------------------------------- */
+
+static enum wire_problem_code unknown(struct scenes *scenes, struct wire_problem *problem,
+                                      const char *name)
+{
+    char known[192];
+    if (!wire_name_ok(name))
+        return wire_problem_set(problem, WIRE_PROBLEM_UNKNOWN_SCENE,
+                                "a scene's name has 1 to 100 characters of A-Z a-z 0-9 . _ - and "
+                                "begins with a letter or digit");
+    scenes_names(scenes, known, sizeof known);
+    return wire_problem_set(problem, WIRE_PROBLEM_UNKNOWN_SCENE,
+                            known[0] ? "there is no scene \"%s\"; there are: %s"
+                                     : "there is no scene \"%s\": the scenes folder is empty%s",
+                            name, known);
+}
+
+enum wire_problem_code scenes_acquire(struct scenes *scenes, struct scene **out,
+                                      struct wire_problem *problem, const char *name)
+{
+    enum wire_scene_state state = WIRE_SCENE_LOADING;
+    char reason[256];
+    reason[0] = 0;
+    struct scene *scene = NULL;
+    pthread_mutex_lock(&scenes->mutex);
+    const struct scene_entry *entry = entry_find(scenes, name);
+    if (entry) {
+        state = entry->state;
+        scene = entry->scene;
+        snprintf(reason, sizeof reason, "%.255s", entry->reason);
+        if (scene)
+            scene->refs++;
+    }
+    pthread_mutex_unlock(&scenes->mutex);
+    if (!entry)
+        return unknown(scenes, problem, name);
+    if (scene) {
+        *out = scene;
+        return WIRE_PROBLEM_NONE;
+    }
+    if (state == WIRE_SCENE_FAILED)
+        return wire_problem_set(problem, WIRE_PROBLEM_SCENE_FAILED, "scene \"%s\": %s", name,
+                                reason);
+    return wire_problem_set(problem, WIRE_PROBLEM_SCENE_NOT_READY,
+                            "scene \"%s\" is being verified; try again soon", name);
+}
+
+void scenes_release(struct scenes *scenes, struct scene **pointer)
+{
+    struct scene *scene = *pointer;
+    if (!scene)
+        return;
+    pthread_mutex_lock(&scenes->mutex);
+    bool last = --scene->refs == 0 && scene->names == 0;
+    pthread_mutex_unlock(&scenes->mutex);
+    *pointer = NULL;
+    if (last)
+        scenes_nudge(scenes); /* unmapping a large scene takes time: not on this thread */
+}
+
+/* With the mutex held; `*held` gets a reference, so that the channels stay. */
+static void entry_describe(struct wire_scene *out, struct scene **held, struct scene_entry *entry)
+{
+    *held = entry->scene;
+    if (entry->scene) {
+        *out = entry->scene->about.scene;
+        out->refs = entry->scene->refs;
+        entry->scene->refs++;
+    } else {
+        *out = (struct wire_scene){.state = entry->state, .open_s = -1};
+        memcpy(out->reason, entry->reason, sizeof out->reason);
+    }
+    memcpy(out->name, entry->name, sizeof out->name);
+}
+
+enum wire_problem_code scenes_write(struct scenes *scenes, char **text,
+                                    struct wire_problem *problem, const char *name)
+{
+    *text = NULL;
+    struct wire_scene *list = NULL;
+    struct scene **held = NULL;
+    size_t count = 0;
+    pthread_mutex_lock(&scenes->mutex);
+    struct scene_entry *one = name ? entry_find(scenes, name) : NULL;
+    size_t room = name ? 1 : scenes->count;
+    list = calloc(room ? room : 1, sizeof *list);
+    held = calloc(room ? room : 1, sizeof *held);
+    if (list && held && (one || !name)) {
+        for (; count < room; count++)
+            entry_describe(&list[count], &held[count], name ? one : scenes->entries[count]);
+    }
+    pthread_mutex_unlock(&scenes->mutex);
+    enum wire_problem_code code = WIRE_PROBLEM_NONE;
+    if (!list || !held)
+        code = wire_problem_set(problem, WIRE_PROBLEM_INTERNAL, "no memory for the list of scenes");
+    else if (name && !one)
+        code = unknown(scenes, problem, name);
+    else
+        *text = name ? wire_scene_write(list) : wire_scenes_write(list, count);
+    for (size_t i = 0; held && i < count; i++)
+        scenes_release(scenes, &held[i]);
+    free(held);
+    free(list);
+    return code;
+}
+
+struct scenes_totals scenes_totals(struct scenes *scenes)
+{
+    struct scenes_totals totals = {0};
+    pthread_mutex_lock(&scenes->mutex);
+    for (size_t i = 0; i < scenes->count; i++) {
+        totals.ready += scenes->entries[i]->state == WIRE_SCENE_READY;
+        totals.loading += scenes->entries[i]->state == WIRE_SCENE_LOADING;
+        totals.failed += scenes->entries[i]->state == WIRE_SCENE_FAILED;
+    }
+    for (const struct scene *scene = scenes->residents; scene; scene = scene->next)
+        totals.bytes += scene->file.bytes;
+    pthread_mutex_unlock(&scenes->mutex);
+    return totals;
+}
