@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes scenes of levels of Debian's package trigger-rally-data (GPL-2+; nothing of it is committed).
+# Makes scenes of levels of the Debian package trigger-rally-data (GPL-2+; none is committed here).
 #
 #   deploy/rally-scenes.sh [--data DIR] [--depth D] [--lightprobe PROGRAM] LEVEL...
 #   deploy/rally-scenes.sh --list        the levels there are

@@ -34,8 +34,8 @@ struct lp_executor *lp_executor_serial(void);
 /* How far long work has come. Written by the engine, read by any thread that shows it; `cancelled`
  * is written by the caller and polled between parts. All zero to begin with. */
 struct lp_progress {
-    _Atomic(const char *) phase;  /* static string, NULL before the first */
     _Atomic uint64_t done, total; /* units of the phase; total 0 = not known */
+    _Atomic(const char *) phase;  /* static string, NULL before the first */
     atomic_bool cancelled;
 };
 

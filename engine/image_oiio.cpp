@@ -89,8 +89,8 @@ OIIO::TypeDesc library_type(lp_oiio_type type)
     return OIIO::TypeDesc::FLOAT;
 }
 
-lp_code encode(uint8_t **out, size_t *out_bytes, const char *format,
-               const lp_oiio_picture *picture, lp_error *err)
+lp_code encode(uint8_t **out, size_t *out_bytes, const char *format, const lp_oiio_picture *picture,
+               lp_error *err)
 {
     set_up_once();
     OIIO::Filesystem::IOVecOutput memory; // declared first: it must outlive the output
@@ -175,8 +175,7 @@ lp_code read_all(void *samples, lp_oiio_reader *reader, lp_error *err)
     bool ok = reader->input->read_image(0, 0, 0, reader->channels, reader->type, samples);
     // A JPEG that ends early is filled up with grey and only a message tells.
     if (!ok || reader->input->has_error())
-        return lp_fail(err, LP_INVALID, reader->path.c_str(),
-                       "is truncated or damaged: %s",
+        return lp_fail(err, LP_INVALID, reader->path.c_str(), "is truncated or damaged: %s",
                        one_line(reader->input->geterror(), reader->path).c_str());
     return LP_OK;
 }

@@ -64,9 +64,9 @@ static int depth_for(double voxels)
 }
 
 /* Checks the parameters and derives the grid of columns. */
-static enum lp_code plan_columns(struct heightmap *map, struct lp_error *err)
+static enum lp_code plan_columns(struct heightmap *import, struct lp_error *err)
 {
-    const struct lp_heightmap_params *params = map->params;
+    const struct lp_heightmap_params *params = import->params;
     if (!params->height_path || !params->height_path[0])
         return lp_fail(err, LP_INVALID, "SOURCE", "no height map is named; give a picture file");
     enum lp_code code = check_length(params->size_m, "--size-m", err);
@@ -76,13 +76,13 @@ static enum lp_code plan_columns(struct heightmap *map, struct lp_error *err)
         code = check_length(params->voxel_m, "--voxel-m", err);
     if (code != LP_OK)
         return code;
-    map->depth = params->depth ? params->depth : LP_IMPORT_DEPTH_DEFAULT;
-    if (map->depth > LP_HEIGHTMAP_DEPTH_MAX)
+    import->depth = params->depth ? params->depth : LP_IMPORT_DEPTH_DEFAULT;
+    if (import->depth > LP_HEIGHTMAP_DEPTH_MAX)
         return lp_fail(err, LP_INVALID, "--depth", "%d is not a depth of height maps: give 1 to %d",
-                       map->depth, LP_HEIGHTMAP_DEPTH_MAX);
-    map->side_vox = UINT32_C(1) << map->depth;
-    map->column_count = map->side_vox;
-    map->voxel_m = params->size_m / map->side_vox;
+                       import->depth, LP_HEIGHTMAP_DEPTH_MAX);
+    import->side_vox = UINT32_C(1) << import->depth;
+    import->column_count = import->side_vox;
+    import->voxel_m = params->size_m / import->side_vox;
     if (params->voxel_m == 0.0)
         return LP_OK;
 
@@ -91,7 +91,7 @@ static enum lp_code plan_columns(struct heightmap *map, struct lp_error *err)
         return lp_fail(err, LP_INVALID, "--voxel-m",
                        "a voxel of %g m is larger than the area of %g m; make it smaller",
                        params->voxel_m, params->size_m);
-    if (columns > map->side_vox) {
+    if (columns > import->side_vox) {
         int depth = depth_for(columns);
         char way_out[32] = "";
         if (depth <= LP_HEIGHTMAP_DEPTH_MAX)
@@ -99,12 +99,12 @@ static enum lp_code plan_columns(struct heightmap *map, struct lp_error *err)
         return lp_fail(err, LP_LIMIT, "--voxel-m",
                        "%g m in voxels of %g m are %.0f columns, but depth %d holds %u; %suse "
                        "larger voxels",
-                       params->size_m, params->voxel_m, columns, map->depth, map->side_vox,
+                       params->size_m, params->voxel_m, columns, import->depth, import->side_vox,
                        way_out);
     }
-    map->column_count = (uint32_t)columns;
-    map->offset_vox = (map->side_vox - map->column_count) / 2;
-    map->voxel_m = params->voxel_m;
+    import->column_count = (uint32_t)columns;
+    import->offset_vox = (import->side_vox - import->column_count) / 2;
+    import->voxel_m = params->voxel_m;
     return LP_OK;
 }
 
@@ -166,64 +166,64 @@ static void colors_to_linear(struct map *map)
     }
 }
 
-static enum lp_code read_maps(struct heightmap *map, struct lp_error *err)
+static enum lp_code read_maps(struct heightmap *import, struct lp_error *err)
 {
-    const struct lp_heightmap_params *params = map->params;
+    const struct lp_heightmap_params *params = import->params;
     lp_progress_phase(params->progress, "reading maps", params->color_path ? 2 : 1);
-    map->heights.used = 1;
+    import->heights.used = 1;
     enum lp_code code =
-        read_map(&map->heights, params->height_path, "height map", map->column_count, err);
+        read_map(&import->heights, params->height_path, "height map", import->column_count, err);
     if (code != LP_OK)
         return code;
-    map->sample_max = map->heights.file.bits == 8 ? 255.0 : 65535.0;
-    heights_to_integers(&map->heights, map->sample_max);
+    import->sample_max = import->heights.file.bits == 8 ? 255.0 : 65535.0;
+    heights_to_integers(&import->heights, import->sample_max);
     if (!params->color_path)
         return LP_OK;
     if (params->progress)
         atomic_store(&params->progress->done, 1);
-    map->colors.used = 3;
-    code = read_map(&map->colors, params->color_path, "colour map", map->column_count, err);
+    import->colors.used = 3;
+    code = read_map(&import->colors, params->color_path, "colour map", import->column_count, err);
     if (code != LP_OK)
         return code;
-    if (map->colors.file.channels < 3)
-        map->colors.used = 1; /* grey, with or without alpha */
-    colors_to_linear(&map->colors);
+    if (import->colors.file.channels < 3)
+        import->colors.used = 1; /* grey, with or without alpha */
+    colors_to_linear(&import->colors);
     return LP_OK;
 }
 
-static enum lp_code create_build(struct heightmap *map, struct lp_error *err)
+static enum lp_code create_build(struct heightmap *import, struct lp_error *err)
 {
-    const struct lp_heightmap_params *params = map->params;
+    const struct lp_heightmap_params *params = import->params;
     /* The map is centred; where the cube cannot be (an odd rest), it sticks out by one voxel. */
-    double corner_m = -(map->offset_vox + map->column_count * 0.5) * map->voxel_m;
-    struct lp_build_params build = {.depth = map->depth,
+    double corner_m = -(import->offset_vox + import->column_count * 0.5) * import->voxel_m;
+    struct lp_build_params build = {.depth = import->depth,
                                     .filter = params->filter,
-                                    .voxel_size_m = map->voxel_m,
+                                    .voxel_size_m = import->voxel_m,
                                     .origin_m = {corner_m, 0.0, corner_m},
                                     .executor = params->executor,
                                     .progress = params->progress};
-    enum lp_code code = lp_build_create(&map->build, &build, err);
-    return code == LP_OK ? lp_batch_create(&map->batch, map->build, err) : code;
+    enum lp_code code = lp_build_create(&import->build, &build, err);
+    return code == LP_OK ? lp_batch_create(&import->batch, import->build, err) : code;
 }
 
-static enum lp_code create_ring(struct heightmap *map, struct lp_error *err)
+static enum lp_code create_ring(struct heightmap *import, struct lp_error *err)
 {
     for (int i = 0; i < RING_ROWS; i++) {
-        map->tops[i] = calloc(map->column_count, sizeof *map->tops[i]);
-        map->rise[i] = calloc(map->column_count, sizeof *map->rise[i]);
-        if (!map->tops[i] || !map->rise[i])
+        import->tops[i] = calloc(import->column_count, sizeof *import->tops[i]);
+        import->rise[i] = calloc(import->column_count, sizeof *import->rise[i]);
+        if (!import->tops[i] || !import->rise[i])
             return lp_fail(err, LP_NO_MEMORY, "", "no memory for rows of %u columns",
-                           map->column_count);
+                           import->column_count);
     }
     return LP_OK;
 }
 
-static enum lp_code fail_too_high(const struct heightmap *map, double height_m,
+static enum lp_code fail_too_high(const struct heightmap *import, double height_m,
                                   struct lp_error *err)
 {
-    double cube_m = map->voxel_m * map->side_vox;
-    int depth = depth_for(map->params->height_m / map->voxel_m);
-    if (map->params->voxel_m != 0.0 && depth <= LP_HEIGHTMAP_DEPTH_MAX)
+    double cube_m = import->voxel_m * import->side_vox;
+    int depth = depth_for(import->params->height_m / import->voxel_m);
+    if (import->params->voxel_m != 0.0 && depth <= LP_HEIGHTMAP_DEPTH_MAX)
         return lp_fail(err, LP_LIMIT, "--height-m",
                        "the relief reaches %.6g m, but the cube is %.6g m high; give --depth %d, "
                        "a larger --voxel-m or a lower --height-m",
@@ -231,62 +231,63 @@ static enum lp_code fail_too_high(const struct heightmap *map, double height_m,
     return lp_fail(err, LP_LIMIT, "--height-m",
                    "the relief reaches %.6g m, but the cube is %.6g m high; give a lower "
                    "--height-m or a larger --voxel-m (%.6g holds it)",
-                   height_m, cube_m, map->params->height_m / map->side_vox);
+                   height_m, cube_m, import->params->height_m / import->side_vox);
 }
 
 /* Row z of columns: how high each rises and which voxel is its top. */
-static enum lp_code sample_heights(struct heightmap *map, uint32_t z, struct lp_error *err)
+static enum lp_code sample_heights(struct heightmap *import, uint32_t z, struct lp_error *err)
 {
-    struct map *heights = &map->heights;
-    uint32_t *tops = map->tops[z % RING_ROWS];
-    double *rise = map->rise[z % RING_ROWS];
+    struct map *heights = &import->heights;
+    uint32_t *tops = import->tops[z % RING_ROWS];
+    double *rise = import->rise[z % RING_ROWS];
     lp_taps_filter_rows(heights->row, &heights->taps, z, heights->file.samples,
                         heights->file.channels, 1);
     lp_taps_filter_columns(heights->columns, &heights->taps, heights->row, 1);
-    for (uint32_t x = 0; x < map->column_count; x++) {
+    for (uint32_t x = 0; x < import->column_count; x++) {
         double sample = heights->columns[x];
-        double height_m = map->params->height_m;
-        if (sample < map->sample_max) /* rounding could lift it above the largest */
-            height_m = (sample > 0.0 ? sample : 0.0) * map->params->height_m / map->sample_max;
-        double height_vox = height_m / map->voxel_m;
-        if (height_vox > map->side_vox)
-            return fail_too_high(map, height_m, err);
-        rise[x] = height_m / map->params->height_m;
-        tops[x] = height_vox < map->side_vox ? (uint32_t)height_vox : map->side_vox - 1;
+        double height_m = import->params->height_m;
+        if (sample < import->sample_max) /* rounding could lift it above the largest */
+            height_m =
+                (sample > 0.0 ? sample : 0.0) * import->params->height_m / import->sample_max;
+        double height_vox = height_m / import->voxel_m;
+        if (height_vox > import->side_vox)
+            return fail_too_high(import, height_m, err);
+        rise[x] = height_m / import->params->height_m;
+        tops[x] = height_vox < import->side_vox ? (uint32_t)height_vox : import->side_vox - 1;
     }
     return LP_OK;
 }
 
 /* The sRGB colour of a column of the row that was filtered last. */
-static void column_color(uint8_t srgb[3], const struct heightmap *map, uint32_t x, double rise)
+static void column_color(uint8_t srgb[3], const struct heightmap *import, uint32_t x, double rise)
 {
-    uint32_t used = map->colors.used;
+    uint32_t used = import->colors.used;
     for (uint32_t c = 0; c < 3; c++) {
         double linear = GREY_DARKEST_LIN + (GREY_BRIGHT_LIN - GREY_DARKEST_LIN) * rise;
         if (used > 0)
-            linear = map->colors.columns[(size_t)x * used + (used == 3 ? c : 0)];
+            linear = import->colors.columns[(size_t)x * used + (used == 3 ? c : 0)];
         srgb[c] = lp_srgb_from_linear((float)linear);
     }
 }
 
 /* Pushes the surface of row z; the rows around it are in the ring. */
-static enum lp_code push_row(struct heightmap *map, uint32_t z, struct lp_error *err)
+static enum lp_code push_row(struct heightmap *import, uint32_t z, struct lp_error *err)
 {
-    struct map *colors = &map->colors;
+    struct map *colors = &import->colors;
     const uint32_t *const tops[3] = {
-        z > 0 ? map->tops[(z - 1) % RING_ROWS] : NULL, map->tops[z % RING_ROWS],
-        z + 1 < map->column_count ? map->tops[(z + 1) % RING_ROWS] : NULL};
+        z > 0 ? import->tops[(z - 1) % RING_ROWS] : NULL, import->tops[z % RING_ROWS],
+        z + 1 < import->column_count ? import->tops[(z + 1) % RING_ROWS] : NULL};
     if (colors->used > 0) {
         lp_taps_filter_rows(colors->row, &colors->taps, z, colors->file.samples,
                             colors->file.channels, colors->used);
         lp_taps_filter_columns(colors->columns, &colors->taps, colors->row, colors->used);
     }
-    for (uint32_t x = 0; x < map->column_count; x++) {
-        struct lp_voxel voxel = {.x = map->offset_vox + x, .z = map->offset_vox + z};
-        column_color(voxel.albedo_srgb, map, x, map->rise[z % RING_ROWS][x]);
-        for (voxel.y = lp_columns_lowest(tops, map->column_count, x); voxel.y <= tops[1][x];
+    for (uint32_t x = 0; x < import->column_count; x++) {
+        struct lp_voxel voxel = {.x = import->offset_vox + x, .z = import->offset_vox + z};
+        column_color(voxel.albedo_srgb, import, x, import->rise[z % RING_ROWS][x]);
+        for (voxel.y = lp_columns_lowest(tops, import->column_count, x); voxel.y <= tops[1][x];
              voxel.y++) {
-            enum lp_code code = lp_batch_add(map->batch, &voxel, NULL, err);
+            enum lp_code code = lp_batch_add(import->batch, &voxel, NULL, err);
             if (code != LP_OK)
                 return code;
         }
@@ -294,46 +295,47 @@ static enum lp_code push_row(struct heightmap *map, uint32_t z, struct lp_error 
     return LP_OK;
 }
 
-static enum lp_code push_columns(struct heightmap *map, struct lp_error *err)
+static enum lp_code push_columns(struct heightmap *import, struct lp_error *err)
 {
-    struct lp_progress *progress = map->params->progress;
-    lp_progress_phase(progress, "columns", map->column_count);
-    enum lp_code code = sample_heights(map, 0, err);
-    for (uint32_t z = 0; code == LP_OK && z < map->column_count; z++) {
+    struct lp_progress *progress = import->params->progress;
+    lp_progress_phase(progress, "columns", import->column_count);
+    enum lp_code code = sample_heights(import, 0, err);
+    for (uint32_t z = 0; code == LP_OK && z < import->column_count; z++) {
         if (lp_progress_cancelled(progress))
-            return lp_fail(err, LP_CANCELLED, map->params->height_path, "the import was cancelled");
-        if (z + 1 < map->column_count)
-            code = sample_heights(map, z + 1, err);
+            return lp_fail(err, LP_CANCELLED, import->params->height_path,
+                           "the import was cancelled");
+        if (z + 1 < import->column_count)
+            code = sample_heights(import, z + 1, err);
         if (code == LP_OK)
-            code = push_row(map, z, err);
+            code = push_row(import, z, err);
         if (progress)
             atomic_store_explicit(&progress->done, z + 1, memory_order_relaxed);
     }
-    return code == LP_OK ? lp_batch_flush(map->batch, err) : code;
+    return code == LP_OK ? lp_batch_flush(import->batch, err) : code;
 }
 
 enum lp_code lp_import_heightmap(void **out, size_t *out_bytes,
                                  const struct lp_heightmap_params *params, struct lp_error *err)
 {
-    struct heightmap map = {.params = params};
-    enum lp_code code = plan_columns(&map, err);
+    struct heightmap import = {.params = params};
+    enum lp_code code = plan_columns(&import, err);
     if (code == LP_OK)
-        code = read_maps(&map, err);
+        code = read_maps(&import, err);
     if (code == LP_OK)
-        code = create_build(&map, err);
+        code = create_build(&import, err);
     if (code == LP_OK)
-        code = create_ring(&map, err);
+        code = create_ring(&import, err);
     if (code == LP_OK)
-        code = push_columns(&map, err);
-    finish_map(&map.heights); /* the build needs the memory more */
-    finish_map(&map.colors);
+        code = push_columns(&import, err);
+    finish_map(&import.heights); /* the build needs the memory more */
+    finish_map(&import.colors);
     if (code == LP_OK)
-        code = lp_build_finish(out, out_bytes, map.build, err);
+        code = lp_build_finish(out, out_bytes, import.build, err);
     for (int i = 0; i < RING_ROWS; i++) {
-        free(map.tops[i]);
-        free(map.rise[i]);
+        free(import.tops[i]);
+        free(import.rise[i]);
     }
-    lp_batch_destroy(&map.batch);
-    lp_build_destroy(&map.build);
+    lp_batch_destroy(&import.batch);
+    lp_build_destroy(&import.build);
     return code;
 }

@@ -91,8 +91,8 @@ static const char *gate_ambiguity(const struct gate *gate)
         return "a request has one Origin header";
     if (gate->path[0] != '/')
         return "the request's target must be a path that begins with a slash";
-    if (gate->target_has_nul)
-        return "the request's target must not hold a NUL";
+    if (gate->target_is_odd)
+        return "the request's target must not hold spaces or NUL";
     return NULL;
 }
 

@@ -14,7 +14,7 @@
 /* What the head says. All zero to begin with; filled by gate_header, the rest by the caller. */
 struct gate {
     size_t target_bytes; /* as sent, undecoded */
-    bool target_has_nul; /* "%00": the decoded path would end there */
+    bool target_is_odd;  /* it holds a space, a NUL, or "%00": readers would cut it differently */
     const char *path;    /* decoded */
     const char *version; /* "HTTP/1.1" */
     size_t header_bytes;

@@ -40,8 +40,9 @@ struct http_request {
     struct route_match match;  /* likewise */
     char id[65];               /* X-Request-Id */
     uint64_t begin_ns;
+    const char *target; /* as sent; good in the first call of the handler */
     size_t target_bytes;
-    bool target_has_nul;
+    bool target_is_odd; /* a NUL or a space, plain or in disguise */
     bool has_body;  /* one was announced */
     bool left;      /* the client went away while waiting */
     bool queued;    /* libmicrohttpd took the answer */

@@ -51,7 +51,7 @@ void *http_on_target(void *cls, const char *target, struct MHD_Connection *conne
     struct http *http = cls;
     struct http_connection *peer =
         MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT)->socket_context;
-    struct http_request *request = peer ? calloc(1, sizeof *request) : NULL;
+    struct http_request *request = peer && target ? calloc(1, sizeof *request) : NULL;
     if (!request)
         return NULL;
     request->http = http;
@@ -59,8 +59,9 @@ void *http_on_target(void *cls, const char *target, struct MHD_Connection *conne
     request->peer = peer;
     request->connection = connection;
     request->begin_ns = clock_ns();
+    request->target = target;
     request->target_bytes = strlen(target);
-    request->target_has_nul = strstr(target, "%00") != NULL;
+    request->target_is_odd = strstr(target, "%00") || strchr(target, ' ');
     peer->request = request;
     http->pending++;
     return request;
@@ -146,9 +147,14 @@ static bool head_take(struct http_request *request, const char *version)
     struct http *http = request->http;
     struct wire_problem problem = {0};
     struct gate gate = {.target_bytes = request->target_bytes,
-                        .target_has_nul = request->target_has_nul,
+                        .target_is_odd = request->target_is_odd,
                         .path = request->path,
                         .version = version};
+    /* The library reads the target as a C text; its version text stands right behind the target in
+     * the same buffer, so a NUL in between shows as a gap. */
+    if (version > request->target && *version &&
+        (size_t)(version - request->target) != request->target_bytes + 1)
+        gate.target_is_odd = true;
     const union MHD_ConnectionInfo *info =
         MHD_get_connection_info(request->connection, MHD_CONNECTION_INFO_REQUEST_HEADER_SIZE);
     gate.header_bytes = info ? info->header_size : 0;

@@ -1,7 +1,6 @@
 /* The scenes that can be rendered: names, states, and the reference-counted resident set. */
 #include "server/scenes.h"
 
-#include "server/clock.h"
 #include "server/log.h"
 #include "server/scenes_private.h"
 
@@ -30,6 +29,7 @@ static void scenes_free(struct scenes *scenes)
         close(scenes->inotify_fd);
     if (scenes->event_fd >= 0)
         close(scenes->event_fd);
+    ending_finish(&scenes->ending);
     pthread_mutex_destroy(&scenes->mutex);
     free(scenes);
 }
@@ -43,6 +43,7 @@ enum lp_code scenes_start(struct scenes **out, const struct data_dir *dir, int w
     scenes->dir = dir;
     scenes->wake_fd = wake_fd;
     pthread_mutex_init(&scenes->mutex, NULL);
+    ending_init(&scenes->ending);
     scenes->event_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     /* Without inotify (its watches are limited) the regular look every two seconds remains. */
     scenes->inotify_fd = inotify_init1(IN_CLOEXEC | IN_NONBLOCK);
@@ -79,10 +80,9 @@ bool scenes_join(struct scenes **pointer, uint64_t until_ns)
     struct scenes *scenes = *pointer;
     if (!scenes)
         return true;
-    struct timespec until = {.tv_sec = (time_t)(until_ns / CLOCK_NS_PER_S),
-                             .tv_nsec = (long)(until_ns % CLOCK_NS_PER_S)};
-    if (pthread_clockjoin_np(scenes->thread, NULL, CLOCK_MONOTONIC, &until) != 0)
+    if (!ending_wait(&scenes->ending, 1, until_ns))
         return false;
+    pthread_join(scenes->thread, NULL);
     scenes_free(scenes);
     *pointer = NULL;
     return true;

@@ -2,6 +2,7 @@
 #ifndef SCENES_PRIVATE_H
 #define SCENES_PRIVATE_H
 
+#include "server/ending.h"
 #include "server/scene_store.h"
 #include "server/scenes.h"
 
@@ -29,6 +30,7 @@ struct scenes {
     int event_fd; /* ours: stop, or a scene lost its last user */
     int inotify_fd;
     pthread_t thread;
+    struct ending ending;
     atomic_bool stop, scanned;
 
     pthread_mutex_t mutex;

@@ -128,9 +128,11 @@ static void entry_failed(struct scenes *scenes, struct scene_entry *entry, enum 
     entry->retry_ns = now + entry->delay_ns;
     if (young) /* it stays what it was: loading, or the old scene */
         return;
+    char reason[512];
+    snprintf(reason, sizeof reason, "scenes/%s%s: %s", entry->name, SUFFIX, error->text);
     log_event(LOG_WARNING, "scene_failed", "scene=%s reason=%s", entry->name,
-              log_quote(error->text).text);
-    scenes_fail(scenes, entry, error->text);
+              log_quote(reason).text);
+    scenes_fail(scenes, entry, reason);
     scenes->stale = true;
 }
 
@@ -301,5 +303,6 @@ void *scenes_main(void *argument)
         events_read(scenes->inotify_fd);
     }
     announce(scenes); /* nobody shall wait for a scan that does not come */
+    ending_note(&scenes->ending);
     return NULL;
 }

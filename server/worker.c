@@ -1,7 +1,7 @@
 /* The render workers: threads that render tiles, and finish jobs. */
 #include "server/worker.h"
 
-#include "server/clock.h"
+#include "server/ending.h"
 
 #include <errno.h>
 #include <pthread.h>
@@ -17,12 +17,13 @@
 struct worker {
     pthread_t thread;
     uint32_t index;
-    bool joined;
     struct queue *queue;
     struct results *results;
+    struct ending *ending;
 };
 
 struct workers {
+    struct ending ending;
     uint32_t count;
     struct worker list[];
 };
@@ -63,6 +64,7 @@ static void *worker_main(void *argument)
         worker_finish(job, worker->queue, worker->results);
         queue_finish(worker->queue, job);
     }
+    ending_note(worker->ending);
     return NULL;
 }
 
@@ -76,13 +78,15 @@ enum lp_code workers_start(struct workers **out, uint32_t count, struct queue *q
     struct workers *workers = calloc(1, bytes);
     if (!workers)
         return lp_fail(err, LP_NO_MEMORY, "--workers", "no memory for the workers");
+    ending_init(&workers->ending);
     for (uint32_t i = 0; i < count; i++) {
         struct worker *worker = &workers->list[i];
-        *worker = (struct worker){.index = i, .queue = queue, .results = results};
+        *worker = (struct worker){
+            .index = i, .queue = queue, .results = results, .ending = &workers->ending};
         int failed = pthread_create(&worker->thread, NULL, worker_main, worker);
         if (failed) {
             queue_stop(queue);
-            (void)workers_join(&workers, UINT64_MAX);
+            (void)workers_join(&workers, UINT64_MAX / 2);
             return lp_fail(err, LP_NO_MEMORY, "--workers", "worker %u cannot be started: %s", i,
                            strerror(failed));
         }
@@ -97,19 +101,11 @@ bool workers_join(struct workers **pointer, uint64_t until_ns)
     struct workers *workers = *pointer;
     if (!workers)
         return true;
-    struct timespec until = {.tv_sec = (time_t)(until_ns / CLOCK_NS_PER_S),
-                             .tv_nsec = (long)(until_ns % CLOCK_NS_PER_S)};
-    for (uint32_t i = 0; i < workers->count; i++) {
-        struct worker *worker = &workers->list[i];
-        if (worker->joined)
-            continue;
-        int failed = until_ns == UINT64_MAX
-                         ? pthread_join(worker->thread, NULL)
-                         : pthread_clockjoin_np(worker->thread, NULL, CLOCK_MONOTONIC, &until);
-        if (failed)
-            return false;
-        worker->joined = true;
-    }
+    if (!ending_wait(&workers->ending, workers->count, until_ns))
+        return false;
+    for (uint32_t i = 0; i < workers->count; i++)
+        pthread_join(workers->list[i].thread, NULL);
+    ending_finish(&workers->ending);
     free(workers);
     *pointer = NULL;
     return true;

@@ -36,18 +36,20 @@ enum lpc_code lpc_refused(struct lpc_client *client, const struct lpc_answer *an
     append(text, sizeof text, "%s%s: %d", lpc_server_shown(client), path, answer->status);
     if (*slug)
         append(text, sizeof text, " %s", slug);
-    if (detail || title)
+    const struct wire_value *errors = wire_read_get(root, "errors");
+    if (wire_read_count(errors) > 0)
+        append(text, sizeof text, ":"); /* the detail only sums up the offenders */
+    else if (detail || title)
         append(text, sizeof text, ": %s", detail ? detail : title);
     else
         append(text, sizeof text, ": does a lightprobe daemon listen there?");
-    const struct wire_value *errors = wire_read_get(root, "errors");
     uint32_t shown = 0;
     for (const struct wire_value *one = wire_read_first(errors); one && shown < ERRORS_SHOWN;
          one = wire_read_next(one), shown++) {
         const char *pointer = wire_read_text(wire_read_get(one, "pointer"));
         const char *what = wire_read_text(wire_read_get(one, "detail"));
-        append(text, sizeof text, "; %s: %s", pointer && *pointer ? pointer : "the document",
-               what ? what : "wrong");
+        append(text, sizeof text, "%s %s: %s", shown ? ";" : "",
+               pointer && *pointer ? pointer : "the document", what ? what : "wrong");
     }
     if (wire_read_count(errors) > shown)
         append(text, sizeof text, "; and %zu more", wire_read_count(errors) - shown);

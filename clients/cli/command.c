@@ -54,12 +54,13 @@ enum lp_code command_take_problem(struct lp_error *err, const char *where,
 {
     char text[LP_ERROR_TEXT_BYTES];
     size_t used = 0;
-    int length = snprintf(text, sizeof text, "%s", problem->detail);
-    used += length < 0 ? 0 : (size_t)length;
+    /* The detail sums up the first offender: it is said only where there are none. */
+    if (problem->error_count == 0)
+        snprintf(text, sizeof text, "%s", problem->detail);
     for (uint32_t i = 0; i < problem->error_count && used < sizeof text; i++) {
         const struct wire_field_error *one = &problem->errors[i];
-        length = snprintf(text + used, sizeof text - used, "; %s: %s",
-                          one->pointer[0] ? one->pointer : "the document", one->detail);
+        int length = snprintf(text + used, sizeof text - used, "%s%s: %s", i ? "; " : "",
+                              one->pointer[0] ? one->pointer : "the document", one->detail);
         used += length < 0 ? 0 : (size_t)length;
     }
     return lp_fail(err, LP_INVALID, where, "%s", text);

@@ -37,7 +37,7 @@ static enum lp_code make_job(struct wire_job *job, const struct render_options *
     if (code != LP_OK)
         goto out;
     if (wire_job_read(job, problem, text, bytes) != WIRE_PROBLEM_NONE)
-        code = command_take_problem(err, options->request ? options->request : "flags", problem);
+        code = command_take_problem(err, options->request ? options->request : "the job", problem);
     else if (strcmp(job->scene, scene->name) != 0)
         code = lp_fail(err, LP_INVALID, options->request ? options->request : "--scene",
                        "the job is for scene \"%s\", but the file is %s: they have to agree",
@@ -153,7 +153,7 @@ enum lp_code render_local(struct render_outcome *outcome, const struct render_op
     if (code != LP_OK)
         goto out;
     if (bake_plan(&plan, problem, &file.scene, &result->request) != WIRE_PROBLEM_NONE) {
-        code = command_take_problem(err, options->request ? options->request : "flags", problem);
+        code = command_take_problem(err, options->request ? options->request : "the job", problem);
         goto out;
     }
     code = render_make_folder(options->folder, err);

@@ -4,6 +4,7 @@ import hashlib
 import json
 import math
 import re
+import struct
 import unittest
 
 import picture
@@ -210,7 +211,8 @@ class Pictures(unittest.TestCase):
         self.assertEqual((strip.width, strip.height), (384, 64))
 
     def test_exr_by_accept_holds_the_film(self):
-        request = job(sphere, environment={"constant": [0.25, 1.5, 40.0]}, face_px=16)
+        # in a corner of the floor, so that above there is nothing but sky
+        request = job(sphere, environment={"constant": [0.25, 1.5, 40.0]}, probes=[[3.5, 2, 3.5]])
         answer = daemon.request("POST", "/v1/render", request, {"Accept": "image/x-exr"})
         self.assertEqual((answer.status, answer.headers["Content-Type"]), (200, "image/x-exr"))
         exr, attributes = picture.exr_read(answer.body)
@@ -219,8 +221,6 @@ class Pictures(unittest.TestCase):
         up = exr.at(2 * 16 + 8, 8)  # +Y: sky only, stronger than white
         self.assertEqual(up, (0.25, 1.5, 40.0))
         # The film's hash is over these very floats, face after face.
-        import struct
-
         film = b"".join(struct.pack("<3f", *exr.at(face * 16 + x, y))
                         for face in range(6) for y in range(16) for x in range(16))
         self.assertEqual(hashlib.sha256(film).hexdigest(),

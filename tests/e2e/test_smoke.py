@@ -10,7 +10,7 @@ SMOKE = ROOT / "clients" / "curl" / "smoke.sh"
 
 def smoke(url):
     return subprocess.run(["bash", str(SMOKE), url], capture_output=True, env=ENVIRONMENT,
-                          timeout=600, text=True)
+                          timeout=600, text=True, errors="replace")
 
 
 class Smoke(unittest.TestCase):

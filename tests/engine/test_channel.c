@@ -65,8 +65,8 @@ TEST(rgb9e5_gives_every_code_back)
 {
     for (uint32_t exponent = 0; exponent < 32; exponent++)
         for (uint32_t mantissa = 0; mantissa < 512; mantissa++) {
-            uint32_t packed = mantissa | (511 - mantissa) << 9 | (mantissa / 2) << 18 |
-                              exponent << 27;
+            uint32_t packed =
+                mantissa | (511 - mantissa) << 9 | (mantissa / 2) << 18 | exponent << 27;
             float rgb[3], again[3];
             lp_rgb9e5_decode(rgb, packed);
             CHECK((double)rgb[0] == ldexp(mantissa, (int)exponent - 24));

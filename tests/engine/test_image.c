@@ -165,7 +165,8 @@ static void fail_to_read(struct lp_error *err, enum lp_code code, const char *pa
     fflush(NULL);
     int kept_out = dup(1), kept_err = dup(2);
     int file = open("printed", O_RDWR | O_CREAT | O_TRUNC, 0600);
-    REQUIRE(kept_out >= 0 && kept_err >= 0 && file >= 0 && dup2(file, 1) == 1 && dup2(file, 2) == 2);
+    REQUIRE(kept_out >= 0 && kept_err >= 0 && file >= 0 && dup2(file, 1) == 1 &&
+            dup2(file, 2) == 2);
     struct lp_samples samples = {.width_px = 77};
     *err = (struct lp_error){0};
     enum lp_code got = lp_image_read(&samples, path, most, err);

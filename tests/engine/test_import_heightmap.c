@@ -117,7 +117,8 @@ TEST(surface_equals_the_brute_force_one)
             for (uint32_t bits = 8; bits <= 16; bits += 8) {
                 uint32_t n = 1u << depth, largest = (1u << bits) - 1;
                 for (uint32_t i = 0; i < n * n; i++) {
-                    samples[i] = shaped_sample((enum shape)shape, i % n, i / n, n, largest, &random);
+                    samples[i] =
+                        shaped_sample((enum shape)shape, i % n, i / n, n, largest, &random);
                     /* size = height: in voxels it is sample * n / largest, the full one the top */
                     uint32_t top = samples[i] * n / largest;
                     tops[i] = (int)(top < n ? top : n - 1);
@@ -228,8 +229,12 @@ TEST(colors_are_filtered_in_linear_light)
         colors[c] = colors[9 + c] = 255; /* a checkerboard of black and white */
     test_write_png("h.png", &height, 1, 1, 1, 8);
     test_write_png("c.png", colors, 2, 2, 3, 8);
-    struct lp_heightmap_params params = {.height_path = "h.png", .color_path = "c.png",
-                                         .size_m = 1, .height_m = 1, .voxel_m = 1, .depth = 1};
+    struct lp_heightmap_params params = {.height_path = "h.png",
+                                         .color_path = "c.png",
+                                         .size_m = 1,
+                                         .height_m = 1,
+                                         .voxel_m = 1,
+                                         .depth = 1};
     struct imported imported;
     import(&imported, &params); /* one column over all of it */
     uint8_t srgb[3];
@@ -249,12 +254,14 @@ TEST(color_maps_of_any_size_and_kind_are_taken)
             uint32_t n = sizes[s];
             for (size_t i = 0; i < (size_t)n * n; i++)
                 for (uint32_t c = 0; c < channels; c++) /* alpha 128 must not matter */
-                    colors[i * channels + c] = (uint16_t)(c + 1 == channels && channels % 2 == 0
-                                                              ? 128
-                                                              : 60 * (c + 1));
+                    colors[i * channels + c] =
+                        (uint16_t)(c + 1 == channels && channels % 2 == 0 ? 128 : 60 * (c + 1));
             test_write_png("c.png", colors, n, n, channels, 8);
-            struct lp_heightmap_params params = {.height_path = "h.png", .color_path = "c.png",
-                                                 .size_m = 1, .height_m = 1, .depth = 3};
+            struct lp_heightmap_params params = {.height_path = "h.png",
+                                                 .color_path = "c.png",
+                                                 .size_m = 1,
+                                                 .height_m = 1,
+                                                 .depth = 3};
             struct imported imported;
             import(&imported, &params);
             uint8_t srgb[3];
@@ -289,8 +296,8 @@ TEST(sixteen_bits_tell_heights_apart_that_eight_do_not)
     for (int i = 0; i < N * N; i++)
         samples[i] = (uint16_t)(32768 + 16 * i); /* a voxel is 16 steps high: 65536 / 4096 */
     test_write_png("h.png", samples, N, N, 1, 16);
-    struct lp_heightmap_params params = {.height_path = "h.png", .size_m = N, .height_m = 4095.9375,
-                                         .voxel_m = 1, .depth = 12};
+    struct lp_heightmap_params params = {
+        .height_path = "h.png", .size_m = N, .height_m = 4095.9375, .voxel_m = 1, .depth = 12};
     struct imported imported;
     import(&imported, &params);
     for (uint32_t i = 0; i < N * N; i++) {
@@ -436,9 +443,9 @@ TEST(an_import_can_be_cancelled_and_says_how_far_it_is)
 {
     uint16_t samples[4] = {0, 0, 0, 255};
     test_write_png("h.png", samples, 2, 2, 1, 8);
-    struct lp_progress progress = {0};
-    struct lp_heightmap_params params = {.height_path = "h.png", .size_m = 8, .height_m = 1,
-                                         .depth = 5, .progress = &progress};
+    struct lp_progress progress = {.done = 0};
+    struct lp_heightmap_params params = {
+        .height_path = "h.png", .size_m = 8, .height_m = 1, .depth = 5, .progress = &progress};
     atomic_store(&progress.cancelled, true);
     struct lp_error err;
     fail_to_import(&err, LP_CANCELLED, "h.png", &params);

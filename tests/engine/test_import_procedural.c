@@ -172,9 +172,8 @@ TEST(sphere_is_coloured_by_normal_and_its_floor_by_squares)
         }
     CHECK_EQ(dark, light);
     /* The pole of +X is redder than that of -X, and so on for green along Y and blue along Z. */
-    const int poles[3][2][3] = {{{47, 24, 32}, {16, 24, 32}},
-                                {{32, 39, 32}, {32, 8, 32}},
-                                {{32, 24, 47}, {32, 24, 16}}};
+    const int poles[3][2][3] = {
+        {{47, 24, 32}, {16, 24, 32}}, {{32, 39, 32}, {32, 8, 32}}, {{32, 24, 47}, {32, 24, 16}}};
     for (int axis = 0; axis < 3; axis++) {
         const int *high = poles[axis][0], *low = poles[axis][1];
         REQUIRE(voxel_at(&first, scene, high[0], high[1], high[2]));
@@ -229,7 +228,7 @@ TEST(procedural_scenes_have_names)
 
 TEST(a_procedural_import_can_be_cancelled)
 {
-    struct lp_progress progress = {0};
+    struct lp_progress progress = {.done = 0};
     atomic_store(&progress.cancelled, true);
     for (int which = 0; which < 2; which++) {
         struct lp_procedural_params params = {

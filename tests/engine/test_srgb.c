@@ -62,8 +62,7 @@ TEST(srgb_never_falls_when_light_rises)
         float b = nextafterf(a, 2.0f);
         CHECK(lp_srgb_from_linear(a) <= lp_srgb_from_linear(b));
         /* The nearest code, by the curve itself (away from the thresholds' own rounding). */
-        long double encoded =
-            a <= 0.0031308f ? a * 12.92L : 1.055L * powl(a, 1.0L / 2.4L) - 0.055L;
+        long double encoded = a <= 0.0031308f ? a * 12.92L : 1.055L * powl(a, 1.0L / 2.4L) - 0.055L;
         CHECK(fabsl(encoded * 255.0L - lp_srgb_from_linear(a)) <= 0.5001L);
     }
 }
