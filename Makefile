@@ -153,7 +153,7 @@ $(B)/tests/clients/test_commands: | $(B)/lightprobe
 
 # ---- for people ----------------------------------------------------------------------------------
 
-.PHONY: help setup demo serve test check-style golden install clean
+.PHONY: help setup demo serve test check-style golden picture install clean
 
 help: ## this list
 	@echo 'make TARGET [CONFIG=release|debug|sanitize|tsan] [COMPILER=gcc|clang]'
@@ -180,6 +180,12 @@ check-style: ## layers, headers, format, sizes
 
 golden: all ## renew the golden images of tests/golden (look at them, and say why in the commit)
 	@$(PYTHON) tests/e2e/test_golden.py --renew
+
+picture: all ## make the README's picture anew (tests/gallery/arizonachase.png)
+	deploy/rally-scenes.sh --data '$(DATA)' --depth 11 arizonachase
+	build/lightprobe render '$(DATA)'/scenes/arizonachase.lps \
+	    --request tests/gallery/arizonachase.json --format png -o build/gallery
+	cp build/gallery/arizonachase.png tests/gallery/arizonachase.png
 
 install: all ## copy both programs below PREFIX (/usr/local), or DESTDIR/PREFIX
 	install -d '$(DESTDIR)$(PREFIX)/bin'

@@ -51,7 +51,7 @@ exec {from_daemon}< <(exec build/lightprobed --listen 127.0.0.1:0 --data "$DATA"
 daemon_pid=$!
 read -r -t "$READY_TIMEOUT_S" line <&"$from_daemon" || {
     tail -n 5 "$daemon_log" >&2
-    fail "the daemon did not get ready (its last lines are above). Does another one use $DATA already?"
+    fail "the daemon did not get ready (its last lines are above). Where another one uses $DATA, end it or take another folder: make demo DATA=other"
 }
 case $line in
 "ready http://"*) url=${line#ready } ;;

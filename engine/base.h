@@ -32,7 +32,7 @@ enum lp_code {
     __attribute__((format(printf, format_index, first_index)))
 
 #define LP_ERROR_WHERE_BYTES 160
-#define LP_ERROR_TEXT_BYTES  352
+#define LP_ERROR_TEXT_BYTES  384
 
 /* The detail of a failure, owned by the caller; all zero means "no failure yet". */
 struct lp_error {

@@ -9,12 +9,13 @@
 /* Quality of each offer, as far as the headers seen so far say. All zero: no header yet. */
 struct accept_choice {
     unsigned header_count;
-    int quality[ACCEPT_OFFERS_MAX];         /* thousandths */
+    int quality[ACCEPT_OFFERS_MAX];          /* thousandths */
     unsigned specificity[ACCEPT_OFFERS_MAX]; /* 0 none, 1 star, 2 type, 3 exact */
 };
 
 /* Takes one Accept header's value into account (RFC 9110, 12.5.1). Unreadable ranges are passed
- * over. `offers` are plain lower-case media types, at most ACCEPT_OFFERS_MAX, the same each time. */
+ * over. `offers` are plain lower-case media types, at most ACCEPT_OFFERS_MAX, the same each time.
+ */
 void accept_header(struct accept_choice *choice, const char *value, const char *const *offers,
                    size_t offer_count);
 

@@ -59,7 +59,8 @@ enum lp_code address_parse(struct address *out, const char *text, struct lp_erro
     char host[64];
     size_t n = (size_t)(colon - text);
     if (n == 0 || n >= sizeof host)
-        return lp_fail(err, LP_INVALID, WHERE, "\"%.80s\" has no usable host before the port", text);
+        return lp_fail(err, LP_INVALID, WHERE, "\"%.80s\" has no usable host before the port",
+                       text);
     memcpy(host, text, n);
     host[n] = 0;
     struct sockaddr_in v4 = {.sin_family = AF_INET, .sin_port = htons(address.port)};

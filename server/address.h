@@ -16,10 +16,10 @@ struct address {
     enum address_kind kind;
     struct sockaddr_storage socket; /* as bind takes it */
     socklen_t socket_bytes;
-    uint16_t port;                 /* TCP: the real one after address_listen */
-    char host[64];                 /* TCP: as in a URL: 127.0.0.1, [::1] */
+    uint16_t port; /* TCP: the real one after address_listen */
+    char host[64]; /* TCP: as in a URL: 127.0.0.1, [::1] */
     char path[sizeof((struct sockaddr_un *)0)->sun_path]; /* UNIX */
-    char url[ADDRESS_TEXT_BYTES];  /* http://127.0.0.1:8080 or unix:PATH */
+    char url[ADDRESS_TEXT_BYTES];                         /* http://127.0.0.1:8080 or unix:PATH */
 };
 
 /* Reads HOST:PORT, [IPv6]:PORT, localhost:PORT or unix:PATH. Only loopback: this version has no

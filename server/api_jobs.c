@@ -31,8 +31,9 @@ static const char *state_of(const struct server *server, const struct record *re
 {
     if (record->job)
         return queue_phase(server->queue, record->job) == JOB_WAITING ? "queued" : "running";
-    return record->outcome == JOB_DONE ? "done" : record->outcome == JOB_FAILED ? "failed"
-                                                                                 : "cancelled";
+    return record->outcome == JOB_DONE     ? "done"
+           : record->outcome == JOB_FAILED ? "failed"
+                                           : "cancelled";
 }
 
 /* Why there is no result; NULL for one that is done or on its way. */
@@ -49,13 +50,13 @@ void api_job(struct http_request *request)
     const struct record *record = record_of(request);
     if (!record)
         return;
-    struct wire_job_status status = {
-        .kind = WIRE_KIND_RENDER,
-        .state = state_of(request->server, record),
-        .reason = reason_of(record),
-        .done = !record->job && record->outcome == JOB_DONE,
-        .total = 1,
-        .rays = record->job ? atomic_load(&record->job->rays) : record->rays};
+    struct wire_job_status status = {.kind = WIRE_KIND_RENDER,
+                                     .state = state_of(request->server, record),
+                                     .reason = reason_of(record),
+                                     .done = !record->job && record->outcome == JOB_DONE,
+                                     .total = 1,
+                                     .rays = record->job ? atomic_load(&record->job->rays)
+                                                         : record->rays};
     memcpy(status.id, record->id, sizeof status.id);
     http_text(request, 200, "application/json", wire_job_status_write(&status));
 }
@@ -102,7 +103,8 @@ void api_job_result(struct http_request *request)
     answer_file(request, &record->document, "application/json", record->id);
 }
 
-/* ---- pictures ---------------------------------------------------------------------------------- */
+/* ---- pictures ----------------------------------------------------------------------------------
+ */
 
 /* Which format a name like "0.png" means. */
 static enum wire_problem_code picture_of(enum wire_image *out, struct wire_problem *problem,
@@ -140,7 +142,8 @@ static enum wire_problem_code view_check(const struct http_request *request,
         wire_problem_field(problem, "/layout",
                            "the layout is strip; others are not in this version");
     if (aov && strcmp(aov, "radiance") != 0)
-        wire_problem_field(problem, "/aov", "the layer is radiance; others are not in this version");
+        wire_problem_field(problem, "/aov",
+                           "the layer is radiance; others are not in this version");
     if (http_query(request, "face"))
         wire_problem_field(problem, "/face", "single faces are not in this version; cut the strip");
     if (http_query(request, "lighting"))

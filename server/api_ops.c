@@ -8,7 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* ---- health ------------------------------------------------------------------------------------ */
+/* ---- health ------------------------------------------------------------------------------------
+ */
 
 void api_health_live(struct http_request *request)
 {
@@ -49,7 +50,8 @@ void api_health_ready(struct http_request *request)
     http_answer(request, &reply);
 }
 
-/* ---- statistics -------------------------------------------------------------------------------- */
+/* ---- statistics --------------------------------------------------------------------------------
+ */
 
 static void stats_queue(struct wire_doc *doc, const struct server *server)
 {
@@ -129,14 +131,15 @@ void api_stats(struct http_request *request)
               server->stats_text ? strdup(server->stats_text) : NULL);
 }
 
-/* ---- the page ---------------------------------------------------------------------------------- */
+/* ---- the page ----------------------------------------------------------------------------------
+ */
 
 /* Names of scenes and routes are of plain letters, so nothing here needs escaping. */
 static void page_write(FILE *page, struct http_request *request)
 {
     struct server *server = request->server;
-    const char *url = server->address->kind == ADDRESS_TCP ? server->address->url
-                                                           : "http://localhost";
+    const char *url =
+        server->address->kind == ADDRESS_TCP ? server->address->url : "http://localhost";
     char names[4096];
     scenes_names(server->scenes, names, sizeof names);
     fprintf(page,

@@ -25,7 +25,8 @@ static void refuse(struct http_request *request, const struct wire_problem *prob
     http_problem(request, problem);
 }
 
-/* ---- admission --------------------------------------------------------------------------------- */
+/* ---- admission ---------------------------------------------------------------------------------
+ */
 
 /* Sets space for the results aside; the oldest results make room where they have been readable for
  * long enough. */
@@ -159,7 +160,8 @@ static void render_begin(struct http_request *request, const struct wire_job *wa
     http_wait(request);
 }
 
-/* ---- the answer -------------------------------------------------------------------------------- */
+/* ---- the answer --------------------------------------------------------------------------------
+ */
 
 static void answer_picture(struct http_request *request, const struct job *job,
                            enum wire_image image, const char *timing)
@@ -217,7 +219,8 @@ static void render_answer(struct http_request *request)
     job_destroy(&job);
 }
 
-/* ---- the handler ------------------------------------------------------------------------------- */
+/* ---- the handler -------------------------------------------------------------------------------
+ */
 
 /* Reads the body here or elsewhere. */
 static void render_read(struct http_request *request)
@@ -232,8 +235,7 @@ static void render_read(struct http_request *request)
             render_begin(request, &wanted);
         return;
     }
-    request->reading =
-        background_read(request->server->background, request, request->body, bytes);
+    request->reading = background_read(request->server->background, request, request->body, bytes);
     if (!request->reading) {
         wire_problem_set(&problem, WIRE_PROBLEM_BUSY, "too many long bodies at once; try later");
         refuse(request, &problem);
@@ -286,7 +288,8 @@ void api_render_abandon(struct http_request *request)
         queue_cancel(request->server->queue, job);
 }
 
-/* ---- coming back ------------------------------------------------------------------------------- */
+/* ---- coming back -------------------------------------------------------------------------------
+ */
 
 static void job_log(const struct job *job)
 {

@@ -1,4 +1,5 @@
-/* Small blocking work beside the loop, on libuv's pool: long bodies, and the unlinking of results. */
+/* Small blocking work beside the loop, on libuv's pool: long bodies, and the unlinking of results.
+ */
 #include "server/background.h"
 
 #include "server/http.h"
@@ -10,7 +11,8 @@ void background_init(struct background *background, uv_loop_t *uv, struct result
     *background = (struct background){.uv = uv, .results = results};
 }
 
-/* ---- long bodies ------------------------------------------------------------------------------- */
+/* ---- long bodies -------------------------------------------------------------------------------
+ */
 
 static void reading_free(struct reading *reading)
 {
@@ -69,7 +71,8 @@ void background_release(struct reading **pointer)
     *pointer = NULL;
 }
 
-/* ---- unlinking --------------------------------------------------------------------------------- */
+/* ---- unlinking ---------------------------------------------------------------------------------
+ */
 
 /* Thread: pool. */
 static void sweep_work(uv_work_t *work)

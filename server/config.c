@@ -73,9 +73,8 @@ static void config_defaults(struct config *out)
                    : count > CONFIG_WORKERS_MAX ? CONFIG_WORKERS_MAX
                                                 : (uint64_t)count;
     long pages = sysconf(_SC_PHYS_PAGES), page_bytes = sysconf(_SC_PAGESIZE);
-    uint64_t mib = pages > 0 && page_bytes > 0
-                       ? (uint64_t)pages * (uint64_t)page_bytes / 2 / (1u << 20)
-                       : 0;
+    uint64_t mib =
+        pages > 0 && page_bytes > 0 ? (uint64_t)pages * (uint64_t)page_bytes / 2 / (1u << 20) : 0;
     out->memory_limit_mib = mib < 256 ? 256 : mib;
 }
 
@@ -195,13 +194,14 @@ void config_write_help(FILE *file)
             fprintf(file, "; %" PRIu64 " to %" PRIu64, o->min, o->max);
         fprintf(file, "; environment %s\n", o->env);
     }
-    fprintf(file, "  %-26s read the configuration, print it, and end\n"
-                  "  %-26s print the version, and end\n"
-                  "  %-26s print this, and end\n\n"
-                  "Flags win over the environment. Standard output carries one line,\n"
-                  "\"ready http://HOST:PORT\", when the daemon takes requests; logs go to\n"
-                  "standard error. SIGTERM drains. Exit: 0 drained, 1 failed while running,\n"
-                  "2 could not start as configured.\n",
+    fprintf(file,
+            "  %-26s read the configuration, print it, and end\n"
+            "  %-26s print the version, and end\n"
+            "  %-26s print this, and end\n\n"
+            "Flags win over the environment. Standard output carries one line,\n"
+            "\"ready http://HOST:PORT\", when the daemon takes requests; logs go to\n"
+            "standard error. SIGTERM drains. Exit: 0 drained, 1 failed while running,\n"
+            "2 could not start as configured.\n",
             "--check-config", "--version", "--help");
 }
 

@@ -8,10 +8,10 @@
 
 /* Descriptors stay open for the life of the process; everything below is opened beneath them. */
 struct data_dir {
-    int lock_fd;     /* DIR/lock, locked */
-    int scenes_fd;   /* DIR/scenes: the operator's files */
-    int resident_fd; /* DIR/resident: our checked copies */
-    int results_fd;  /* DIR/results */
+    int lock_fd;                    /* DIR/lock, locked */
+    int scenes_fd;                  /* DIR/scenes: the operator's files */
+    int resident_fd;                /* DIR/resident: our checked copies */
+    int results_fd;                 /* DIR/results */
     char path[DATA_DIR_PATH_BYTES]; /* absolute */
 };
 
@@ -31,8 +31,7 @@ enum data_sync {
 /* Writes NAME beneath `folder_fd` through a temporary file and a rename, mode 0444. On failure
  * nothing is left. LP_NO_SPACE, LP_IO. Thread: any. */
 LP_MUST_CHECK enum lp_code data_file_write(int folder_fd, const char *name, const void *data,
-                                           size_t bytes, enum data_sync sync,
-                                           struct lp_error *err);
+                                           size_t bytes, enum data_sync sync, struct lp_error *err);
 
 /* The error that the `errno` of a write means. */
 enum lp_code data_fail_errno(struct lp_error *err, const char *where, const char *what, int number);

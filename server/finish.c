@@ -20,9 +20,8 @@ static bool job_is_cancelled(struct job *job)
 }
 
 /* Encodes one format and keeps the file. */
-static enum lp_code picture_make(struct job *job, struct wire_probe *probe,
-                                 struct results *results, enum wire_image image,
-                                 struct lp_error *err)
+static enum lp_code picture_make(struct job *job, struct wire_probe *probe, struct results *results,
+                                 enum wire_image image, struct lp_error *err)
 {
     struct bake_picture picture = {0};
     struct job_picture *kept = &job->pictures[image];
@@ -120,9 +119,7 @@ void worker_finish(struct job *job, struct queue *queue, struct results *results
     job->encode_s = clock_seconds(clock_ns() - rendered_ns);
     if (!code && !job_is_cancelled(job))
         code = document_make(job, probe, results, &error);
-    job->outcome = code                    ? JOB_FAILED
-                   : job->document.key[0] ? JOB_DONE
-                                           : JOB_CANCELLED;
+    job->outcome = code ? JOB_FAILED : job->document.key[0] ? JOB_DONE : JOB_CANCELLED;
     if (code) {
         job->failure = problem_of(code);
         snprintf(job->failure_text, sizeof job->failure_text, "%s", error.text);

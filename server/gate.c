@@ -104,8 +104,8 @@ int gate_check(const struct gate *gate, const struct address *own, struct wire_p
         return 400;
     }
     if (gate->target_bytes > GATE_TARGET_BYTES_MAX) {
-        wire_problem_set(problem, WIRE_PROBLEM_TOO_LARGE,
-                         "a request's target has at most %d bytes", GATE_TARGET_BYTES_MAX);
+        wire_problem_set(problem, WIRE_PROBLEM_TOO_LARGE, "a request's target has at most %d bytes",
+                         GATE_TARGET_BYTES_MAX);
         return 414;
     }
     if (gate->header_bytes > GATE_HEADER_BYTES_MAX) {

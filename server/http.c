@@ -12,11 +12,12 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#define POOL_BYTES  (32u << 10) /* of a connection: its head, and the buffers of its body */
-#define FDS_AT_LEAST 256        /* files, scenes, watches, and the like */
+#define POOL_BYTES   (32u << 10) /* of a connection: its head, and the buffers of its body */
+#define ACCEPT_RUNS  16
+#define FDS_AT_LEAST 256 /* files, scenes, watches, and the like */
 
-__attribute__((format(printf, 2, 0))) static void
-on_library_log(void *cls, const char *format, va_list list)
+__attribute__((format(printf, 2, 0))) static void on_library_log(void *cls, const char *format,
+                                                                 va_list list)
 {
     char text[256];
     (void)cls;
@@ -84,8 +85,13 @@ void http_quiesce(struct http *http)
 {
     if (http->quiesced)
         return;
-    MHD_run(http->daemon); /* whoever is in the backlog was let in by us: answer them */
-    (void)MHD_quiesce_daemon(http->daemon);
+    /* Whoever is in the backlog was let in already, and would be reset: accept them. A run accepts
+     * a few. */
+    for (int i = 0; i < ACCEPT_RUNS; i++)
+        MHD_run(http->daemon);
+    int listen_fd = MHD_quiesce_daemon(http->daemon);
+    if (listen_fd >= 0)
+        close(listen_fd);
     http->quiesced = true;
 }
 

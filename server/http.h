@@ -43,14 +43,14 @@ struct http_request {
     const char *target; /* as sent; good in the first call of the handler */
     size_t target_bytes;
     bool target_is_odd; /* a NUL or a space, plain or in disguise */
-    bool has_body;  /* one was announced */
-    bool left;      /* the client went away while waiting */
-    bool queued;    /* libmicrohttpd took the answer */
-    char *body;     /* as far as it came; owned */
+    bool has_body;      /* one was announced */
+    bool left;          /* the client went away while waiting */
+    bool queued;        /* libmicrohttpd took the answer */
+    char *body;         /* as far as it came; owned */
     size_t body_bytes, body_room;
     bool body_refused; /* too much is being uploaded already */
 
-    bool watched;              /* http_watch.c */
+    bool watched; /* http_watch.c */
 
     /* The render's own (api_render.c), between waiting and answering. */
     struct reading *reading; /* its body, being read elsewhere */
@@ -59,7 +59,7 @@ struct http_request {
 };
 
 struct http_params {
-    int listen_fd; /* stays the caller's */
+    int listen_fd; /* taken over when http_start succeeds */
     const struct address *own;
     uint64_t connection_limit;
     struct server *server;
@@ -87,7 +87,7 @@ void http_tick(struct http *http);
 
 /* From now on every answer closes its connection. */
 void http_close_after_answers(struct http *http);
-/* No new connections from now on. */
+/* No new connections from now on: they are refused by the system. */
 void http_quiesce(struct http *http);
 /* Requests whose answer has not gone out. */
 size_t http_pending(const struct http *http);
@@ -97,14 +97,15 @@ struct http_totals {
 };
 struct http_totals http_totals(const struct http *http);
 
-/* ---- for handlers ------------------------------------------------------------------------------ */
+/* ---- for handlers ------------------------------------------------------------------------------
+ */
 
 /* An answer. All zero but `status` is an empty one. */
 struct http_reply {
     int status;
     const char *media_type;
-    char *text;   /* owned by http_reply from the call on; or */
-    int fd;       /* ... a file, when from_fd; likewise owned */
+    char *text; /* owned by http_reply from the call on; or */
+    int fd;     /* ... a file, when from_fd; likewise owned */
     bool from_fd;
     uint64_t bytes;
     const char *etag_sha256;      /* strong ETag; If-None-Match is heeded */

@@ -6,12 +6,12 @@
 
 #include <microhttpd.h>
 
-#define HTTP_HEAD_DEADLINE_S   10    /* from the request line to the end of the headers */
-#define HTTP_IDLE_DEADLINE_S   20    /* keep-alive, and the libraries' inactivity */
-#define HTTP_BODY_GRACE_S      10    /* then at least ... */
-#define HTTP_BODY_RATE         1024  /* ... bytes a second on the average */
+#define HTTP_HEAD_DEADLINE_S   10           /* from the request line to the end of the headers */
+#define HTTP_IDLE_DEADLINE_S   20           /* keep-alive, and the libraries' inactivity */
+#define HTTP_BODY_GRACE_S      10           /* then at least ... */
+#define HTTP_BODY_RATE         1024         /* ... bytes a second on the average */
 #define HTTP_BODIES_BYTES_MAX  (256u << 20) /* of all that are being collected */
-#define HTTP_CONNECTIONS_EXTRA 64    /* beyond the limit: to be told so */
+#define HTTP_CONNECTIONS_EXTRA 64           /* beyond the limit: to be told so */
 #define HTTP_LINGERS_MAX       256
 #define HTTP_LINGER_BYTES_MAX  (8u << 20)
 #define HTTP_LINGER_S          2
@@ -19,7 +19,7 @@
 /* An open connection. */
 struct http_connection {
     struct http_connection *next, *previous;
-    int fd; /* libmicrohttpd's: valid until it says that the connection is closed */
+    int fd;            /* libmicrohttpd's: valid until it says that the connection is closed */
     bool overflow;     /* beyond the limit: told 503 */
     bool cut;          /* shut down by http_tick */
     uint64_t since_ns; /* when it became idle */

@@ -12,26 +12,16 @@ static const struct {
     int status;
     unsigned retry_after_s;
 } problem_table[] = {
-    [WIRE_PROBLEM_NONE] = {500, 0},
-    [WIRE_PROBLEM_BAD_REQUEST] = {400, 0},
-    [WIRE_PROBLEM_INVALID_JSON] = {400, 0},
-    [WIRE_PROBLEM_INVALID_FIELD] = {422, 0},
-    [WIRE_PROBLEM_FOREIGN_ORIGIN] = {403, 0},
-    [WIRE_PROBLEM_UNKNOWN_ROUTE] = {404, 0},
-    [WIRE_PROBLEM_UNKNOWN_SCENE] = {404, 0},
-    [WIRE_PROBLEM_UNKNOWN_JOB] = {404, 0},
-    [WIRE_PROBLEM_UNKNOWN_IMAGE] = {404, 0},
-    [WIRE_PROBLEM_METHOD_NOT_ALLOWED] = {405, 0},
-    [WIRE_PROBLEM_NOT_ACCEPTABLE] = {406, 0},
-    [WIRE_PROBLEM_SCENE_NOT_READY] = {503, 1},
-    [WIRE_PROBLEM_SCENE_FAILED] = {409, 0},
-    [WIRE_PROBLEM_CONFLICT] = {409, 0},
-    [WIRE_PROBLEM_GONE] = {410, 0},
-    [WIRE_PROBLEM_TOO_LARGE] = {413, 0},
-    [WIRE_PROBLEM_OVER_LIMIT] = {422, 0},
-    [WIRE_PROBLEM_BUSY] = {503, 1},
-    [WIRE_PROBLEM_DRAINING] = {503, 5},
-    [WIRE_PROBLEM_DISK_FULL] = {507, 0},
+    [WIRE_PROBLEM_NONE] = {500, 0},           [WIRE_PROBLEM_BAD_REQUEST] = {400, 0},
+    [WIRE_PROBLEM_INVALID_JSON] = {400, 0},   [WIRE_PROBLEM_INVALID_FIELD] = {422, 0},
+    [WIRE_PROBLEM_FOREIGN_ORIGIN] = {403, 0}, [WIRE_PROBLEM_UNKNOWN_ROUTE] = {404, 0},
+    [WIRE_PROBLEM_UNKNOWN_SCENE] = {404, 0},  [WIRE_PROBLEM_UNKNOWN_JOB] = {404, 0},
+    [WIRE_PROBLEM_UNKNOWN_IMAGE] = {404, 0},  [WIRE_PROBLEM_METHOD_NOT_ALLOWED] = {405, 0},
+    [WIRE_PROBLEM_NOT_ACCEPTABLE] = {406, 0}, [WIRE_PROBLEM_SCENE_NOT_READY] = {503, 1},
+    [WIRE_PROBLEM_SCENE_FAILED] = {409, 0},   [WIRE_PROBLEM_CONFLICT] = {409, 0},
+    [WIRE_PROBLEM_GONE] = {410, 0},           [WIRE_PROBLEM_TOO_LARGE] = {413, 0},
+    [WIRE_PROBLEM_OVER_LIMIT] = {422, 0},     [WIRE_PROBLEM_BUSY] = {503, 1},
+    [WIRE_PROBLEM_DRAINING] = {503, 5},       [WIRE_PROBLEM_DISK_FULL] = {507, 0},
     [WIRE_PROBLEM_INTERNAL] = {500, 0},
 };
 
@@ -53,7 +43,8 @@ static bool tag_is_known(const struct http_request *request, const char *tag)
         MHD_lookup_connection_value(request->connection, MHD_HEADER_KIND, "If-None-Match");
     if (!list)
         return false;
-    return strcmp(list, "*") == 0 || strstr(list, tag) != NULL; /* a hash in quotes: no false hits */
+    return strcmp(list, "*") == 0 ||
+           strstr(list, tag) != NULL; /* a hash in quotes: no false hits */
 }
 
 static struct MHD_Response *response_make(struct http_reply *reply)
@@ -135,13 +126,12 @@ void http_answer(struct http_request *request, struct http_reply *reply)
 void http_problem_with(struct http_request *request, const struct wire_problem *problem,
                        const struct http_reply *with)
 {
-    struct http_reply reply = {.status = with->status ? with->status
-                                                      : http_problem_status(problem->code),
-                               .media_type = "application/problem+json",
-                               .allow = with->allow,
-                               .retry_after_s = with->retry_after_s
-                                                    ? with->retry_after_s
-                                                    : problem_table[problem->code].retry_after_s};
+    struct http_reply reply = {
+        .status = with->status ? with->status : http_problem_status(problem->code),
+        .media_type = "application/problem+json",
+        .allow = with->allow,
+        .retry_after_s =
+            with->retry_after_s ? with->retry_after_s : problem_table[problem->code].retry_after_s};
     reply.text = wire_problem_write(problem, reply.status, request->id);
     reply.bytes = reply.text ? strlen(reply.text) : 0;
     http_answer(request, &reply);

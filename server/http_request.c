@@ -10,7 +10,8 @@
 
 #define BODY_FIRST_BYTES 4096
 
-/* ---- life -------------------------------------------------------------------------------------- */
+/* ---- life --------------------------------------------------------------------------------------
+ */
 
 void http_on_connection(void *cls, struct MHD_Connection *connection, void **context,
                         enum MHD_ConnectionNotificationCode what)
@@ -22,7 +23,8 @@ void http_on_connection(void *cls, struct MHD_Connection *connection, void **con
         *context = peer; /* NULL: http_on_target refuses its requests */
         if (!peer)
             return;
-        peer->fd = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd;
+        peer->fd =
+            MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd;
         peer->since_ns = clock_ns();
         peer->overflow = http->totals.connections >= http->params.connection_limit;
         peer->next = http->connections;
@@ -88,7 +90,8 @@ void http_on_completed(void *cls, struct MHD_Connection *connection, void **poin
     *pointer = NULL;
 }
 
-/* ---- the head ---------------------------------------------------------------------------------- */
+/* ---- the head ----------------------------------------------------------------------------------
+ */
 
 static enum MHD_Result gate_take(void *cls, enum MHD_ValueKind kind, const char *name,
                                  const char *value)
@@ -181,7 +184,8 @@ static bool head_take(struct http_request *request, const char *version)
     return true;
 }
 
-/* ---- the body ---------------------------------------------------------------------------------- */
+/* ---- the body ----------------------------------------------------------------------------------
+ */
 
 /* Makes room for `more` bytes; false: no memory, or too much is being uploaded at once. */
 static bool body_grow(struct http_request *request, size_t more)
@@ -214,8 +218,8 @@ static bool body_take(struct http_request *request, const char *piece, size_t by
         return false;
     }
     /* Only POST routes read bodies; others' are counted and dropped. */
-    bool wanted = request->match.verdict == ROUTE_FOUND &&
-                  strcmp(request->match.route->method, "POST") == 0;
+    bool wanted =
+        request->match.verdict == ROUTE_FOUND && strcmp(request->match.route->method, "POST") == 0;
     if (wanted && !request->body_refused) {
         if (body_grow(request, bytes))
             memcpy(request->body + request->body_bytes, piece, bytes);
@@ -226,7 +230,8 @@ static bool body_take(struct http_request *request, const char *piece, size_t by
     return true;
 }
 
-/* ---- the handler ------------------------------------------------------------------------------- */
+/* ---- the handler -------------------------------------------------------------------------------
+ */
 
 static void dispatch(struct http_request *request)
 {
@@ -277,15 +282,15 @@ enum MHD_Result http_on_request(void *cls, struct MHD_Connection *connection, co
         }
         request->phase = HTTP_READY;
         /* The path stays where it was, but the match must not outlive a moved buffer. */
-        route_find(&request->match, request->http->params.routes,
-                   request->http->params.route_count, method, url);
+        route_find(&request->match, request->http->params.routes, request->http->params.route_count,
+                   method, url);
         dispatch(request);
         return verdict(request);
     case HTTP_WAITING: /* resumed by the library itself, at its end */
         return MHD_NO;
     case HTTP_RESUMED:
-        route_find(&request->match, request->http->params.routes,
-                   request->http->params.route_count, method, url);
+        route_find(&request->match, request->http->params.routes, request->http->params.route_count,
+                   method, url);
         request->match.route->handler(request);
         return verdict(request);
     case HTTP_READY:
@@ -312,7 +317,8 @@ void http_resume(struct http_request *request)
     MHD_resume_connection(request->connection);
 }
 
-/* ---- reading ----------------------------------------------------------------------------------- */
+/* ---- reading -----------------------------------------------------------------------------------
+ */
 
 bool http_param(const struct http_request *request, size_t index, char *out, size_t room)
 {

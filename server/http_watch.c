@@ -20,8 +20,8 @@ void http_watch_begin(struct http_request *request)
     /* While a connection is suspended the library neither polls nor closes its socket, so that the
      * descriptor stays good until http_watch_end. */
     struct epoll_event event = {.events = EPOLLRDHUP, .data.u64 = (uint64_t)(uintptr_t)request};
-    request->watched = epoll_ctl(request->http->watch_fd, EPOLL_CTL_ADD, request->peer->fd,
-                                 &event) == 0;
+    request->watched =
+        epoll_ctl(request->http->watch_fd, EPOLL_CTL_ADD, request->peer->fd, &event) == 0;
 }
 
 void http_watch_end(struct http_request *request)

@@ -56,8 +56,8 @@ uint64_t job_results_bytes_max(const struct lp_render_plan *plan,
                                const bool wanted[WIRE_IMAGE_KINDS])
 {
     /* At most 6 * 4096^2 texels: nothing here can overflow 64 bits. */
-    uint64_t texels = (uint64_t)plan->params.face_count * plan->params.face_px *
-                      plan->params.face_px;
+    uint64_t texels =
+        (uint64_t)plan->params.face_count * plan->params.face_px * plan->params.face_px;
     uint64_t bytes = JOB_DOCUMENT_BYTES;
     if (wanted[WIRE_IMAGE_PNG])
         bytes += 3 * texels + texels / 8 + JOB_PICTURE_EXTRA;

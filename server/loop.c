@@ -29,7 +29,8 @@ struct loop {
 
 static void pump(struct loop *loop);
 
-/* ---- draining ---------------------------------------------------------------------------------- */
+/* ---- draining ----------------------------------------------------------------------------------
+ */
 
 static void phase_enter(struct loop *loop, enum server_phase phase, unsigned seconds)
 {
@@ -78,7 +79,8 @@ static void on_signal(uv_signal_t *handle, int number)
     pump(loop);
 }
 
-/* ---- events ------------------------------------------------------------------------------------ */
+/* ---- events ------------------------------------------------------------------------------------
+ */
 
 static void announce(struct loop *loop)
 {
@@ -163,7 +165,8 @@ static void on_tick(uv_timer_t *handle)
     pump(loop);
 }
 
-/* ---- life -------------------------------------------------------------------------------------- */
+/* ---- life --------------------------------------------------------------------------------------
+ */
 
 struct loop *loop_create(struct server *server, int wake_fd)
 {

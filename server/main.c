@@ -23,6 +23,7 @@ struct daemon {
     struct address address;
     struct data_dir dir;
     int listen_fd, wake_fd;
+    bool listening; /* the address is ours to forget */
     struct workers *workers;
     struct loop *loop;
     struct background background;
@@ -47,14 +48,15 @@ static enum lp_code daemon_start(struct daemon *d, struct lp_error *err)
                               .begin_ns = clock_ns(),
                               .memory_limit_bytes = d->config.memory_limit_mib << 20};
     if ((code = data_dir_open(&d->dir, d->config.data, err)) ||
-        (code = address_listen(&d->address, &d->listen_fd, err)) ||
-        (code = results_create(&server->results, d->dir.results_fd,
+        (code = address_listen(&d->address, &d->listen_fd, err)))
+        return code;
+    d->listening = true;
+    if ((code = results_create(&server->results, d->dir.results_fd,
                                d->config.results_limit_mib << 20, err)))
         return code;
     d->wake_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-    server->records =
-        records_create(server->results, d->config.result_retention_s * CLOCK_NS_PER_S,
-                       CONFIG_RETENTION_MIN * CLOCK_NS_PER_S);
+    server->records = records_create(server->results, d->config.result_retention_s * CLOCK_NS_PER_S,
+                                     CONFIG_RETENTION_MIN * CLOCK_NS_PER_S);
     server->queue = queue_create((uint32_t)d->config.queue_limit, d->wake_fd);
     d->loop = loop_create(server, d->wake_fd);
     if (d->wake_fd < 0 || !server->records || !server->queue || !d->loop)
@@ -72,6 +74,7 @@ static enum lp_code daemon_start(struct daemon *d, struct lp_error *err)
         (code = scenes_start(&server->scenes, &d->dir, d->wake_fd, err)) ||
         (code = http_start(&server->http, &params, err)))
         return code;
+    d->listen_fd = -1; /* http's now */
     return LP_OK;
 }
 
@@ -82,6 +85,10 @@ static void daemon_stop(struct daemon *d, int status)
     struct server *server = &d->server;
     uint64_t until_ns = clock_ns() + JOIN_S * CLOCK_NS_PER_S;
     http_stop(&server->http);
+    if (d->listen_fd >= 0)
+        close(d->listen_fd);
+    if (d->listening)
+        address_forget(&d->address);
     if (server->records && server->queue)
         records_cancel_all(server->records, server->queue);
     if (server->queue)
@@ -92,10 +99,6 @@ static void daemon_stop(struct daemon *d, int status)
     bool ended = workers_join(&d->workers, until_ns);
     /* Jobs that never came back still hold scenes: those go with the queue. */
     ended = scenes_join(&server->scenes, until_ns) && ended;
-    if (d->listen_fd >= 0) {
-        close(d->listen_fd);
-        address_forget(&d->address);
-    }
     if (!ended) {
         log_event(LOG_WARNING, "threads_left", "after_s=%d", JOIN_S);
         fflush(stdout);

@@ -29,7 +29,7 @@ struct results {
     int folder_fd;
     uint64_t limit_bytes;
     pthread_mutex_t mutex;
-    pthread_cond_t settled;                      /* a file left WRITING or UNLINKING */
+    pthread_cond_t settled;                       /* a file left WRITING or UNLINKING */
     struct result_file *buckets[RESULTS_BUCKETS]; /* guarded by mutex, the files too */
     uint64_t files, used_bytes, reserved_bytes;   /* guarded by mutex */
     uint64_t doomed;                              /* guarded by mutex: files in DOOMED */
@@ -163,7 +163,8 @@ static struct result_file *file_claim(struct results *results, const char *key, 
     memcpy(file->key, key, strlen(key) + 1);
     file->state = FILE_WRITING;
     file->refs = 1;
-    file->bytes = ((uint64_t)bytes + RESULTS_BLOCK_BYTES - 1) & ~(uint64_t)(RESULTS_BLOCK_BYTES - 1);
+    file->bytes =
+        ((uint64_t)bytes + RESULTS_BLOCK_BYTES - 1) & ~(uint64_t)(RESULTS_BLOCK_BYTES - 1);
     struct result_file **bucket = bucket_of(results, key);
     file->next = *bucket;
     *bucket = file;

@@ -6,7 +6,8 @@
  * settled when its files are written (in between they count twice, never not at all), so the
  * files never take more than the limit. A file's states:
  *
- *     (absent) --put--> WRITING --ok--> THERE --last release--> DOOMED --sweep--> UNLINKING --> (absent)
+ *     (absent) --put--> WRITING --ok--> THERE --last release--> DOOMED --sweep--> UNLINKING -->
+ * (absent)
  *                                         ^-----------put-----------'
  *
  * Results of synchronous calls do not outlive the process (the index is in memory, and the folder
@@ -17,14 +18,14 @@
 #include "protocol/wire.h"
 #include "engine/base.h"
 
-#define RESULTS_KEY_BYTES   72  /* sha256, dot, extension, NUL */
+#define RESULTS_KEY_BYTES   72   /* sha256, dot, extension, NUL */
 #define RESULTS_BLOCK_BYTES 4096 /* what a file is rounded up to, as on the disk */
 
 struct results; /* owns the table of files; thread-safe */
 
 /* Removes what an earlier run left. `folder_fd` stays the caller's. LP_IO, LP_NO_MEMORY. */
-LP_MUST_CHECK enum lp_code results_create(struct results **out, int folder_fd,
-                                          uint64_t limit_bytes, struct lp_error *err);
+LP_MUST_CHECK enum lp_code results_create(struct results **out, int folder_fd, uint64_t limit_bytes,
+                                          struct lp_error *err);
 /* Removes all files, too. Accepts NULL and sets it. No other thread may use it any more. */
 void results_destroy(struct results **results);
 
@@ -36,8 +37,8 @@ void results_settle(struct results *results, uint64_t bytes);
 /* Keeps `data` as <sha256>.<extension> and refers to it once; `key` names it from then on.
  * LP_NO_SPACE, LP_IO, LP_NO_MEMORY: nothing is kept. Blocks for the disk. Thread: worker. */
 LP_MUST_CHECK enum lp_code results_put(struct results *results, char key[RESULTS_KEY_BYTES],
-                                       const char *sha256, const char *extension,
-                                       const void *data, size_t bytes, struct lp_error *err);
+                                       const char *sha256, const char *extension, const void *data,
+                                       size_t bytes, struct lp_error *err);
 /* Drops one reference. Returns whether results_sweep has something to do. Thread: any. */
 bool results_drop(struct results *results, const char *key);
 /* Unlinks the files nobody refers to. Blocks for the disk. Thread: any but the loop. */

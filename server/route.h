@@ -11,7 +11,7 @@ struct http_request;
 
 /* One row. A pattern is segments, `{word}` stands for any one. */
 struct route {
-    const char *method;  /* GET (HEAD goes with it), POST, PUT, DELETE */
+    const char *method; /* GET (HEAD goes with it), POST, PUT, DELETE */
     const char *pattern;
     void (*handler)(struct http_request *request); /* NULL: a later version brings it */
     const char *produces; /* its media type for Accept; NULL: the handler negotiates */

@@ -61,7 +61,8 @@ static bool sha256_ok(const char *text)
            strspn(text, "0123456789abcdef") == WIRE_SHA256_BYTES - 1;
 }
 
-/* ---- the table of verified files --------------------------------------------------------------- */
+/* ---- the table of verified files ---------------------------------------------------------------
+ */
 
 static void table_read_line(struct scene_store *store, const char *line)
 {
@@ -129,8 +130,8 @@ enum lp_code scene_store_save(struct scene_store *store, struct lp_error *err)
     if (fclose(memory) != 0)
         code = lp_fail(err, LP_NO_MEMORY, VERIFIED_NAME, "no memory to write it");
     else
-        code = data_file_write(store->dir->resident_fd, VERIFIED_NAME, text, bytes,
-                               DATA_SYNC_DISK, err);
+        code = data_file_write(store->dir->resident_fd, VERIFIED_NAME, text, bytes, DATA_SYNC_DISK,
+                               err);
     free(text);
     if (!code)
         store->changed = false;
@@ -167,7 +168,8 @@ const char *scene_store_known(const struct scene_store *store,
     return NULL;
 }
 
-/* ---- files ------------------------------------------------------------------------------------- */
+/* ---- files -------------------------------------------------------------------------------------
+ */
 
 struct scene_store *scene_store_create(const struct data_dir *dir, const atomic_bool *stop)
 {
@@ -192,8 +194,8 @@ enum lp_code scene_store_source(const struct scene_store *store, int *out,
 {
     struct stat about;
     /* O_NONBLOCK: a named pipe must not hold us up. */
-    int fd = openat(store->dir->scenes_fd, file_name,
-                    O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+    int fd =
+        openat(store->dir->scenes_fd, file_name, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
     if (fd < 0 && errno == ELOOP)
         return lp_fail(err, LP_INVALID, file_name,
                        "is a link; links are not followed, put the file itself there");

@@ -44,8 +44,7 @@ const char *scene_store_known(const struct scene_store *store,
                               const struct scene_identity *identity);
 /* Copies and hashes the file behind `fd`, verifies the copy and opens it; remembers it.
  * LP_CANCELLED when stopped, LP_CORRUPT also when the file changed meanwhile. */
-LP_MUST_CHECK enum lp_code scene_store_adopt(struct scene_store *store,
-                                             struct lp_scene_file *file,
+LP_MUST_CHECK enum lp_code scene_store_adopt(struct scene_store *store, struct lp_scene_file *file,
                                              char sha256[WIRE_SHA256_BYTES], int fd,
                                              const struct scene_identity *identity,
                                              struct lp_error *err);

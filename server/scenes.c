@@ -13,7 +13,8 @@
 #include <sys/inotify.h>
 #include <unistd.h>
 
-/* ---- life -------------------------------------------------------------------------------------- */
+/* ---- life --------------------------------------------------------------------------------------
+ */
 
 static void scenes_free(struct scenes *scenes)
 {
@@ -93,7 +94,8 @@ bool scenes_scanned(const struct scenes *scenes)
     return atomic_load(&scenes->scanned);
 }
 
-/* ---- names ------------------------------------------------------------------------------------- */
+/* ---- names -------------------------------------------------------------------------------------
+ */
 
 /* Where `name` is or would be. With the mutex held (or on the thread that writes). */
 static size_t entry_place(const struct scenes *scenes, const char *name, bool *there)
@@ -186,7 +188,8 @@ void scenes_names(struct scenes *scenes, char *out, size_t room)
     pthread_mutex_unlock(&scenes->mutex);
 }
 
-/* ---- publishing -------------------------------------------------------------------------------- */
+/* ---- publishing --------------------------------------------------------------------------------
+ */
 
 /* With the mutex held. */
 static void entry_show(struct scene_entry *entry, struct scene *scene)
@@ -298,7 +301,8 @@ size_t scenes_resident_hashes(struct scenes *scenes, char (**out)[WIRE_SHA256_BY
     return count;
 }
 
-/* ---- the loop's side --------------------------------------------------------------------------- */
+/* ---- the loop's side ---------------------------------------------------------------------------
+ */
 
 static enum wire_problem_code unknown(struct scenes *scenes, struct wire_problem *problem,
                                       const char *name)

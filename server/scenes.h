@@ -2,7 +2,8 @@
  *
  * A thread of its own (lp-scenes) looks at DIR/scenes when it changes and every two seconds,
  * verifies what is new and publishes it; the loop acquires and releases. A file that is replaced
- * keeps serving its old scene until the new one is verified; jobs keep the scene they began with. */
+ * keeps serving its old scene until the new one is verified; jobs keep the scene they began with.
+ */
 #ifndef SCENES_H
 #define SCENES_H
 

@@ -22,7 +22,8 @@
 #define ANNOUNCE_AFTER_NS (1 * CLOCK_NS_PER_S) /* of verifying at start, before "ready" is said */
 #define SUFFIX            ".lps"
 
-/* ---- names in the folder ----------------------------------------------------------------------- */
+/* ---- names in the folder -----------------------------------------------------------------------
+ */
 
 /* "NAME.lps" to NAME. */
 static bool name_of_file(char name[WIRE_NAME_BYTES], const char *file)
@@ -98,7 +99,8 @@ static void scan_names(struct scenes *scenes)
     }
 }
 
-/* ---- one file ---------------------------------------------------------------------------------- */
+/* ---- one file ----------------------------------------------------------------------------------
+ */
 
 static bool is_transient(enum lp_code code)
 {
@@ -209,7 +211,8 @@ out:
     close(fd);
 }
 
-/* ---- the thread -------------------------------------------------------------------------------- */
+/* ---- the thread --------------------------------------------------------------------------------
+ */
 
 static void announce(struct scenes *scenes)
 {

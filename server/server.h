@@ -1,4 +1,5 @@
-/* The daemon's long-lived things, as the handlers see them. main.c owns them; the loop uses them. */
+/* The daemon's long-lived things, as the handlers see them. main.c owns them; the loop uses them.
+ */
 #ifndef SERVER_H
 #define SERVER_H
 

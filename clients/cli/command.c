@@ -56,7 +56,7 @@ enum lp_code command_take_problem(struct lp_error *err, const char *where,
     size_t used = 0;
     /* The detail sums up the first offender: it is said only where there are none. */
     if (problem->error_count == 0)
-        snprintf(text, sizeof text, "%s", problem->detail);
+        snprintf(text, sizeof text, "%.*s", (int)sizeof text - 1, problem->detail);
     for (uint32_t i = 0; i < problem->error_count && used < sizeof text; i++) {
         const struct wire_field_error *one = &problem->errors[i];
         int length = snprintf(text + used, sizeof text - used, "%s%s: %s", i ? "; " : "",
