@@ -12,9 +12,9 @@
 
 #define LP_FACE_PX_MAX          4096
 #define LP_SAMPLES_PER_AXIS_MAX 32
-#define LP_TILE_PX              32 /* edge of a tile; tiles at a face's right and bottom may be cut */
-#define LP_LEVEL_CLASSES        9 /* refinement 0..8 below the cone's level */
-#define LP_RAY_CLASSES          3 /* the thesis's 1, 4 and 16 rays */
+#define LP_TILE_PX              32 /* edge of a tile; the last ones of a face may be cut */
+#define LP_LEVEL_CLASSES        9  /* refinement 0..8 below the cone's level */
+#define LP_RAY_CLASSES          3  /* the thesis's 1, 4 and 16 rays */
 
 enum lp_mode {
     LP_MODE_REFERENCE, /* n * n rays a pixel at the finest level */

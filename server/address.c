@@ -42,6 +42,11 @@ static bool port_read(uint16_t *out, const char *text)
     return true;
 }
 
+static void address_name(struct address *address)
+{
+    snprintf(address->url, sizeof address->url, "http://%s:%u", address->host, address->port);
+}
+
 enum lp_code address_parse(struct address *out, const char *text, struct lp_error *err)
 {
     struct address address = {.kind = ADDRESS_TCP};
@@ -90,6 +95,7 @@ enum lp_code address_parse(struct address *out, const char *text, struct lp_erro
                        "%.*s is not a loopback address, and this version has no tokens to guard "
                        "others: use 127.0.0.1, [::1] or a unix socket",
                        (int)n, text);
+    address_name(&address);
     *out = address;
     return LP_OK;
 }
@@ -135,8 +141,7 @@ enum lp_code address_listen(struct address *address, int *out, struct lp_error *
     int got = bind(fd, (const struct sockaddr *)&address->socket, address->socket_bytes);
     umask(old_mask);
     if (got < 0 || listen(fd, ADDRESS_BACKLOG) < 0) {
-        code = lp_fail(err, LP_IO, WHERE, "cannot listen on %s%s%.0u: %s", address->host,
-                       address->path, address->port, strerror(errno));
+        code = lp_fail(err, LP_IO, WHERE, "cannot listen on %s: %s", address->url, strerror(errno));
         goto out;
     }
     if (address->kind == ADDRESS_TCP) {
@@ -151,7 +156,7 @@ enum lp_code address_listen(struct address *address, int *out, struct lp_error *
         memcpy(&v4, &bound, sizeof v4);
         memcpy(&v6, &bound, sizeof v6);
         address->port = ntohs(bound.ss_family == AF_INET6 ? v6.sin6_port : v4.sin_port);
-        snprintf(address->url, sizeof address->url, "http://%s:%u", address->host, address->port);
+        address_name(address);
     }
     *out = fd;
     fd = -1;

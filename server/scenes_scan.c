@@ -15,8 +15,9 @@
 #include <sys/inotify.h>
 #include <unistd.h>
 
-#define SCAN_EVERY_NS     (2 * CLOCK_NS_PER_S)
-#define SETTLE_NS         (1 * CLOCK_NS_PER_S) /* a bad file this young may still be being written */
+#define SCAN_EVERY_NS (2 * CLOCK_NS_PER_S)
+/* A bad file that is younger may still be being written. */
+#define SETTLE_NS         (1 * CLOCK_NS_PER_S)
 #define RETRY_FIRST_NS    (300 * CLOCK_NS_PER_MS)
 #define RETRY_LAST_NS     (30 * CLOCK_NS_PER_S)
 #define ANNOUNCE_AFTER_NS (1 * CLOCK_NS_PER_S) /* of verifying at start, before "ready" is said */
@@ -131,7 +132,10 @@ static void entry_failed(struct scenes *scenes, struct scene_entry *entry, enum 
     if (young) /* it stays what it was: loading, or the old scene */
         return;
     char reason[512];
-    snprintf(reason, sizeof reason, "scenes/%s%s: %s", entry->name, SUFFIX, error->text);
+    /* A place inside of the file helps; a path of our own folders does not. */
+    bool inside = error->where[0] && !strchr(error->where, '/');
+    snprintf(reason, sizeof reason, "scenes/%s%s: %.110s%s%.255s", entry->name, SUFFIX,
+             inside ? error->where : "", inside ? ": " : "", error->text);
     log_event(LOG_WARNING, "scene_failed", "scene=%s reason=%s", entry->name,
               log_quote(reason).text);
     scenes_fail(scenes, entry, reason);
@@ -237,6 +241,15 @@ static void scan(struct scenes *scenes)
     announce(scenes);
 }
 
+static void save(struct scenes *scenes)
+{
+    struct lp_error error = {0};
+    if (scene_store_save(scenes->store, &error))
+        log_event(LOG_WARNING, "verified_not_saved", "error=%s", log_quote(error.text).text);
+    else
+        scenes->stale = false;
+}
+
 /* Copies and memories of scenes that nobody uses any more. */
 static void tidy(struct scenes *scenes)
 {
@@ -245,16 +258,12 @@ static void tidy(struct scenes *scenes)
     if (!scenes->stale || atomic_load(&scenes->stop))
         return;
     char(*hashes)[WIRE_SHA256_BYTES] = NULL;
-    struct lp_error error = {0};
     size_t count = scenes_resident_hashes(scenes, &hashes);
     if (count == SIZE_MAX)
         return;
     scene_store_sweep(scenes->store, (const char(*)[WIRE_SHA256_BYTES])hashes, count);
     free(hashes);
-    if (scene_store_save(scenes->store, &error))
-        log_event(LOG_WARNING, "verified_not_saved", "error=%s", log_quote(error.text).text);
-    else
-        scenes->stale = false;
+    save(scenes);
 }
 
 /* When something has to be tried again at the latest. */
@@ -305,6 +314,7 @@ void *scenes_main(void *argument)
         }
         events_read(scenes->inotify_fd);
     }
+    save(scenes);     /* what was verified since the last look need not be verified again */
     announce(scenes); /* nobody shall wait for a scan that does not come */
     ending_note(&scenes->ending);
     return NULL;

@@ -3,13 +3,18 @@
 
 #include "clients/cli/command.h"
 
+#include <string.h>
+
 enum lp_code scene_info_open(struct bake_scene *out, struct lp_scene_file *file, const char *path,
                              struct lp_error *err)
 {
     struct lp_scene_file opened = {0};
-    enum lp_code code = lp_scene_file_open(&opened, path, LP_TRUST_NOTHING, err);
-    if (code != LP_OK)
-        return code;
+    struct lp_error defect = {0};
+    enum lp_code code = lp_scene_file_open(&opened, path, LP_TRUST_NOTHING, &defect);
+    if (code != LP_OK && strcmp(defect.where, path) == 0)
+        return lp_fail(err, code, path, "%s", defect.text);
+    if (code != LP_OK) /* the place of a defect is inside of the file: name that too */
+        return lp_fail(err, code, path, "%s: %.200s", defect.where, defect.text);
     lp_scene_file_close(&opened);
     double start = command_seconds();
     code = lp_scene_file_open(&opened, path, LP_TRUST_CONTENT, err);

@@ -59,7 +59,9 @@ static struct run run(const char *line)
     int argc = 1;
     program_path(program);
     snprintf(words, sizeof words, "%s", line);
-    for (char *at = strtok(words, " "); at && argc < WORDS_MAX; at = strtok(NULL, " "))
+    char *rest = NULL;
+    for (char *at = strtok_r(words, " ", &rest); at && argc < WORDS_MAX;
+         at = strtok_r(NULL, " ", &rest))
         argv[argc++] = at;
     fflush(NULL);
     pid_t child = fork();

@@ -113,6 +113,8 @@ WRONG = {
     "a word as coordinate": ({"probes": [[0, "1", 0]]}, "/probes/0/1", "number"),
     "null as coordinate": ({"probes": [[0, None, 0]]}, "/probes/0/1", "number"),
     "true as coordinate": ({"probes": [[True, 0, 0]]}, "/probes/0/0", "number"),
+    "metres above ground, of a later version": (
+        {"probes": [{"above_ground_m": 3, "x": 1, "z": 2}]}, "/probes/0", "not in this version"),
     "far away": ({"probes": [[1e300, 0, 0]]}, "/probes/0", ""),
     "kind unknown": ({"kind": "paint"}, "/kind", "render"),
     "kind of a later version": ({"kind": "compare"}, "/kind", "not in this version"),

@@ -443,18 +443,18 @@ TEST(job_offenders_are_collected)
 TEST(job_offenders_have_a_limit)
 {
     static char text[1u << 20];
-    size_t bytes = (size_t)sprintf(text, "{\"scene\":\"a\"");
+    size_t bytes = (size_t)snprintf(text, sizeof text, "{\"scene\":\"a\"");
     for (int i = 0; i < 50000; i++)
-        bytes += (size_t)sprintf(text + bytes, ",\"u%d\":%d", i, i);
-    sprintf(text + bytes, "}");
+        bytes += (size_t)snprintf(text + bytes, sizeof text - bytes, ",\"u%d\":%d", i, i);
+    snprintf(text + bytes, sizeof text - bytes, "}");
     CHECK_EQ(read_job(text), WIRE_PROBLEM_INVALID_FIELD);
     CHECK_EQ(problem.error_count, WIRE_FIELD_ERRORS_MAX);
     CHECK_HAS(problem.detail, "at least 32 fields are wrong");
     CHECK_STR(problem.errors[31].pointer, "/u31");
-    bytes = (size_t)sprintf(text, "{\"scene\":\"a\",\"probes\":[[0");
+    bytes = (size_t)snprintf(text, sizeof text, "{\"scene\":\"a\",\"probes\":[[0");
     for (int i = 0; i < 90000; i++)
-        bytes += (size_t)sprintf(text + bytes, "],[1");
-    sprintf(text + bytes, "]]}");
+        bytes += (size_t)snprintf(text + bytes, sizeof text - bytes, "],[1");
+    snprintf(text + bytes, sizeof text - bytes, "]]}");
     CHECK_EQ(read_job(text), WIRE_PROBLEM_INVALID_JSON); /* too many values */
 }
 

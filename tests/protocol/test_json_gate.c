@@ -414,7 +414,7 @@ TEST(gate_cuts_long_pointers_visibly)
 {
     char text[512] = "{\"";
     memset(text + 2, 'k', 300);
-    strcat(text, "\":1e999}");
+    snprintf(text + 302, sizeof text - 302, "\":1e999}");
     struct wire_problem problem;
     CHECK_EQ(check(&problem, text, strlen(text)), FIND);
     size_t length = strlen(problem.errors[0].pointer);
@@ -442,7 +442,7 @@ TEST(gate_limits_nesting)
     CHECK_HAS(problem.detail, "column 33");
     size_t bytes = 0;
     for (int i = 0; i < 33; i++)
-        bytes += (size_t)sprintf(text + bytes, "{\"a\":");
+        bytes += (size_t)snprintf(text + bytes, sizeof text - bytes, "{\"a\":");
     CHECK_EQ(check(&problem, text, bytes), NO);
     CHECK_HAS(problem.detail, "nested deeper");
 }

@@ -16,13 +16,14 @@ static void example(struct wire_result *result)
     struct wire_problem problem;
     memset(result, 0, sizeof *result);
     REQUIRE(wire_job_read(&result->request, &problem, job, sizeof job - 1) == WIRE_PROBLEM_NONE);
-    strcpy(result->id, "j1");
-    strcpy(result->scene_sha256, "abc");
+    snprintf(result->id, sizeof result->id, "j1");
+    snprintf(result->scene_sha256, sizeof result->scene_sha256, "abc");
     result->probe.position_m[0] = 0.1;
     result->probe.position_m[1] = 2;
     result->probe.position_m[2] = -3;
     result->probe.warning_count = 1;
-    strcpy(result->probe.warnings[0], "the probe is inside matter");
+    snprintf(result->probe.warnings[0], sizeof result->probe.warnings[0],
+             "the probe is inside matter");
     result->probe.counters = (struct wire_counters){.rays = 24576,
                                                     .rays_hit = 20000,
                                                     .traversal_steps = 812345,
@@ -32,16 +33,17 @@ static void example(struct wire_result *result)
                                                     .level_count = 2,
                                                     .pixels_by_rays = {{1, 20000}},
                                                     .pixels_by_level = {{2, 15000}, {0, 5000}}};
-    strcpy(result->probe.film_sha256, "def");
+    snprintf(result->probe.film_sha256, sizeof result->probe.film_sha256, "def");
     result->probe.image_count = 1;
-    strcpy(result->probe.images[0].href, "/v1/jobs/j1/probes/0.png");
-    strcpy(result->probe.images[0].sha256, "123");
+    snprintf(result->probe.images[0].href, sizeof result->probe.images[0].href,
+             "/v1/jobs/j1/probes/0.png");
+    snprintf(result->probe.images[0].sha256, sizeof result->probe.images[0].sha256, "123");
     result->probe.images[0].bytes = 12345;
     result->queued_s = 0.001;
     result->render_s = 0.25;
     result->encode_s = 0.0020000000000000005;
-    strcpy(result->engine, "0.1.0");
-    strcpy(result->kernel, "scalar");
+    snprintf(result->engine, sizeof result->engine, "0.1.0");
+    snprintf(result->kernel, sizeof result->kernel, "scalar");
 }
 
 TEST(result_document_is_the_contracts)

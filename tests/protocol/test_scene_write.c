@@ -2,6 +2,7 @@
 #include "protocol/wire.h"
 #include "tests/harness/test.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -58,7 +59,7 @@ TEST(ready_scenes_show_everything)
 TEST(other_scenes_show_their_state)
 {
     struct wire_scene scene = example();
-    strcpy(scene.reason, "wide node 3: the mask is 0");
+    snprintf(scene.reason, sizeof scene.reason, "wide node 3: the mask is 0");
     static const struct {
         enum wire_scene_state state;
         const char *text;

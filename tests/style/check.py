@@ -36,7 +36,7 @@ LIBRARIES = (
     (("microhttpd.h", "uv.h"), ("server/*",)),
     # the client library may not see the engine, and checks what it downloads itself
     (("nettle/*",), ("engine/sha256.c", "clients/c/*")),
-    (("xxhash.h",), ("engine/*",)),
+    (("xxhash.h",), ("engine/*", "tests/engine/*")),
     (("curl/*",), ("clients/c/*",)),
     (("sqlite3.h",), ("server/store*.c", "server/store*.h")),
 )
@@ -129,10 +129,13 @@ def without_comments(source):
 
 
 def rule_forbidden_calls():
-    """Calls that the house style replaces."""
+    """Calls that the house style replaces. Tests are let off: they copy their own short constants,
+    and run under AddressSanitizer."""
     words = re.compile(r"\b(strcpy|strcat|sprintf|vsprintf|gets|atoi|atol|atof|alloca|strtok|system"
                        r"|popen|tmpnam|mktemp)\s*\(")
     for name in c_files():
+        if name.startswith("tests/"):
+            continue
         for number, line in enumerate(without_comments(text(name)).splitlines(), 1):
             found = words.search(line)
             if found:
