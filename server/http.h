@@ -107,6 +107,7 @@ struct http_reply {
     char *text; /* owned by http_reply from the call on; or */
     int fd;     /* ... a file, when from_fd; likewise owned */
     bool from_fd;
+    bool is_file; /* set by http_answer: from_fd at first */
     uint64_t bytes;
     const char *etag_sha256;      /* strong ETag; If-None-Match is heeded */
     const char *content_location; /* NULL: none; the same for the next ones */

@@ -1,5 +1,6 @@
 /* Answers: headers that all of them have, files, problems, conditions. */
 #include "server/http_private.h"
+#include "server/range.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -47,11 +48,52 @@ static bool tag_is_known(const struct http_request *request, const char *tag)
            strstr(list, tag) != NULL; /* a hash in quotes: no false hits */
 }
 
-static struct MHD_Response *response_make(struct http_reply *reply)
+/* What a reply sends of its representation. */
+struct part {
+    uint64_t first, total;
+    char content_range[72]; /* empty: none */
+};
+
+/* Heeds Range on files (GET alone, and with If-Range only while the tag is still the same): makes
+ * the reply 206 or 416. */
+static void part_choose(struct part *part, const struct http_request *request,
+                        struct http_reply *reply, const char *tag)
+{
+    struct MHD_Connection *connection = request->connection;
+    const char *header = MHD_lookup_connection_value(connection, MHD_HEADER_KIND, "Range");
+    const char *same = MHD_lookup_connection_value(connection, MHD_HEADER_KIND, "If-Range");
+    uint64_t count = 0;
+    *part = (struct part){.total = reply->bytes};
+    if (reply->status != 200 || !reply->from_fd || strcmp(request->method, "GET") != 0 ||
+        (same && strcmp(same, tag)))
+        return;
+    switch (range_read(&part->first, &count, header, part->total)) {
+    case RANGE_WHOLE:
+        break;
+    case RANGE_PART:
+        reply->status = 206;
+        reply->bytes = count;
+        snprintf(part->content_range, sizeof part->content_range, "bytes %llu-%llu/%llu",
+                 (unsigned long long)part->first, (unsigned long long)(part->first + count - 1),
+                 (unsigned long long)part->total);
+        break;
+    case RANGE_UNSATISFIABLE:
+        close(reply->fd);
+        reply->from_fd = false;
+        reply->status = 416;
+        reply->bytes = 0;
+        reply->media_type = NULL;
+        snprintf(part->content_range, sizeof part->content_range, "bytes */%llu",
+                 (unsigned long long)part->total);
+        break;
+    }
+}
+
+static struct MHD_Response *response_make(struct http_reply *reply, const struct part *part)
 {
     struct MHD_Response *response;
     if (reply->from_fd) {
-        response = MHD_create_response_from_fd64(reply->bytes, reply->fd);
+        response = MHD_create_response_from_fd_at_offset64(reply->bytes, reply->fd, part->first);
         if (!response)
             close(reply->fd);
         reply->from_fd = false;
@@ -67,7 +109,7 @@ static struct MHD_Response *response_make(struct http_reply *reply)
 }
 
 static void headers_add(struct MHD_Response *response, const struct http_request *request,
-                        const struct http_reply *reply, const char *tag)
+                        const struct http_reply *reply, const char *tag, const struct part *part)
 {
     char number[16];
     header_add(response, "Content-Type", reply->media_type);
@@ -77,10 +119,11 @@ static void headers_add(struct MHD_Response *response, const struct http_request
         header_add(response, "ETag", tag);
         /* Immutable while it is there, but it expires here: ask again each time. */
         header_add(response, "Cache-Control", "no-cache");
-        header_add(response, "Accept-Ranges", "none");
+        header_add(response, "Accept-Ranges", reply->is_file ? "bytes" : "none");
     } else {
         header_add(response, "Cache-Control", "no-store");
     }
+    header_add(response, "Content-Range", part->content_range[0] ? part->content_range : NULL);
     header_add(response, "Content-Location", reply->content_location);
     header_add(response, "X-Lightprobe-Job", reply->job_id);
     header_add(response, "Server-Timing", reply->server_timing);
@@ -99,6 +142,7 @@ void http_answer(struct http_request *request, struct http_reply *reply)
     tag[0] = 0;
     if (reply->etag_sha256)
         snprintf(tag, sizeof tag, "\"%.64s\"", reply->etag_sha256);
+    reply->is_file = reply->from_fd;
     if (tag[0] && reply->status == 200 && tag_is_known(request, tag)) {
         if (reply->from_fd)
             close(reply->fd);
@@ -109,14 +153,16 @@ void http_answer(struct http_request *request, struct http_reply *reply)
         reply->status = 304;
         reply->media_type = NULL;
     }
+    struct part part;
+    part_choose(&part, request, reply, tag);
     /* Answered before the body was read: the client may be sending still. */
     if (request->has_body && request->phase == HTTP_HEAD)
         http_linger(request->http, request->peer);
     request->phase = HTTP_ANSWERED;
-    struct MHD_Response *response = response_make(reply);
+    struct MHD_Response *response = response_make(reply, &part);
     if (!response)
         return; /* no memory: the connection closes */
-    headers_add(response, request, reply, tag);
+    headers_add(response, request, reply, tag, &part);
     request->queued =
         MHD_queue_response(request->connection, (unsigned)reply->status, response) == MHD_YES;
     MHD_destroy_response(response);
