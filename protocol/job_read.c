@@ -20,7 +20,6 @@ struct reader {
     struct wire_job *job;
     struct wire_problem *problem;
     bool fallback; /* what is being read is the table's default, not the client's value */
-    bool mode_known;
 };
 
 /* More offenders than fit are left out, so there is no use in looking for them. */
@@ -197,7 +196,6 @@ static void read_word(struct reader *reader, const struct wire_field *field, str
     if (!read_one_word(&value, reader, field, at, item))
         return;
     *(uint32_t *)place(reader, field) = value;
-    reader->mode_known |= field->offset == offsetof(struct wire_job, mode);
 }
 
 static void store_words(struct reader *reader, const struct wire_field *field, uint32_t mask)
@@ -442,38 +440,6 @@ static bool read_missing(struct reader *reader, uint64_t seen)
     return true;
 }
 
-static void refuse_unused(struct reader *reader, const struct wire_field *field)
-{
-    char belongs[WIRE_RANGE_BYTES] = "";
-    size_t bytes = 0;
-    for (uint32_t mode = 0; wire_words_mode[mode].text; mode++)
-        if (field->modes >> mode & 1u && wire_words_mode[mode].value != WIRE_WORD_LATER &&
-            bytes < sizeof belongs)
-            bytes += (size_t)snprintf(belongs + bytes, sizeof belongs - bytes, "%s%s",
-                                      bytes ? ", " : "", wire_words_mode[mode].text);
-    wire_problem_field(reader->problem, pointer_to(field->name).text,
-                       "\"%s\" belongs to mode %s; leave it out with mode %s", field->name, belongs,
-                       wire_word_text(wire_words_mode, (int)reader->job->mode));
-}
-
-/* A value that the mode does not look at would be silently without meaning. Its default is let
- * through: it says nothing, and an echoed request, which has all of them, can be sent again.
- * False: out of memory. */
-static bool check_uses(struct reader *reader, uint64_t seen)
-{
-    for (size_t i = 0; i < wire_field_count && reader->mode_known; i++) {
-        const struct wire_field *field = &wire_fields[i];
-        if (!(seen >> i & 1u) || field->later || field->modes >> reader->job->mode & 1u)
-            continue;
-        struct wire_job given = *reader->job;
-        if (!read_fallback(reader, field))
-            return false;
-        if (memcmp(&given, reader->job, sizeof given) != 0)
-            refuse_unused(reader, field);
-    }
-    return true;
-}
-
 static void read_root(struct reader *reader, const cJSON *root, bool *out_of_memory)
 {
     if (!cJSON_IsObject(root)) {
@@ -484,7 +450,7 @@ static void read_root(struct reader *reader, const cJSON *root, bool *out_of_mem
     read_given(reader, &seen, root);
     if (is_full(reader))
         return;
-    *out_of_memory = !read_missing(reader, seen) || !check_uses(reader, seen);
+    *out_of_memory = !read_missing(reader, seen);
 }
 
 enum wire_problem_code wire_job_read(struct wire_job *job, struct wire_problem *problem,

@@ -278,9 +278,6 @@ class Pictures(unittest.TestCase):
         path = daemon.render(job(sphere))["probes"][0]["images"][0]["href"]
         whole = daemon.get(path).body
         part = daemon.get(path, {"Range": "bytes=10-19"})
-        if part.status == 200:  # a server may ignore Range, but then it sends everything
-            self.assertEqual(part.body, whole)
-            return
         self.assertEqual((part.status, part.body), (206, whole[10:20]))
         self.assertEqual(part.headers["Content-Range"], "bytes 10-19/%d" % len(whole))
         tail = daemon.get(path, {"Range": "bytes=-5"})

@@ -342,18 +342,14 @@ TEST(job_fields_of_later_versions_say_so)
            "/probes/0", "not in this version; give [x, y, z]");
 }
 
-TEST(job_fields_belong_to_modes)
+TEST(job_fields_of_other_modes_are_checked_and_kept)
 {
-    refuse_in(LOD, "\"samples_per_axis\":5", "/samples_per_axis",
-              "belongs to mode reference; leave it out with mode lod");
-    refuse_in(REF, "\"levels\":\"fixed\"", "/levels",
-              "belongs to mode lod; leave it out with mode reference");
     refuse_in(REF, "\"levels\":\"coarse\"", "/levels", "\"coarse\" is not known here");
-    refuse_in(BASE, "\"mode\":\"nothing\",\"levels\":\"fixed\",\"samples_per_axis\":1", "/mode",
-              "not known");
-    /* An echoed request has all fields; their defaults say nothing. */
-    accept_in(LOD, "\"samples_per_axis\":4");
-    accept_in(REF, "\"levels\":\"cone\"");
+    refuse_in(LOD, "\"samples_per_axis\":33", "/samples_per_axis", "out of range");
+    accept_in(LOD, "\"samples_per_axis\":5");
+    CHECK_EQ(job.samples_per_axis, 5);
+    accept_in(REF, "\"levels\":\"fixed\"");
+    CHECK_EQ(job.levels, WIRE_LEVELS_FIXED);
 }
 
 TEST(job_has_exactly_one_probe)

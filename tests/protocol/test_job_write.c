@@ -72,11 +72,8 @@ static void random_job(test_random *random, struct wire_job *job)
     for (uint8_t face = 0; face < 6; face++)
         if (faces >> face & 1)
             job->faces[job->face_count++] = face;
-    /* What the mode does not use has its default. */
-    job->levels = job->mode == WIRE_MODE_LOD && test_random_below(random, 2) ? WIRE_LEVELS_FIXED
-                                                                             : WIRE_LEVELS_CONE;
-    job->samples_per_axis =
-        job->mode == WIRE_MODE_REFERENCE ? 1 + test_random_below(random, 32) : 4;
+    job->levels = test_random_below(random, 2) ? WIRE_LEVELS_FIXED : WIRE_LEVELS_CONE;
+    job->samples_per_axis = 1 + test_random_below(random, 32);
     job->seed = test_random_u64(random) >> (11 + test_random_below(random, 50));
     if (test_random_below(random, 20) == 0)
         job->seed = UINT64_C(1) << 53;
