@@ -114,19 +114,14 @@ void lp_build_destroy(struct lp_build **build)
     *build = NULL;
 }
 
-uint64_t lp_build_pushed(const struct lp_build *build)
-{
-    return build->count;
-}
-
-/* A chunk and its value arrays in one block. */
-static enum lp_code add_chunk(struct lp_build *build, struct lp_error *err)
+/* A chunk and its value arrays in one block; `intended` voxels are to be held in the end. */
+static enum lp_code add_chunk(struct lp_build *build, uint64_t intended, struct lp_error *err)
 {
     size_t bytes = sizeof(struct lp_build_chunk);
     for (uint32_t c = 0; c < build->channel_count; c++)
         bytes += (size_t)build->channels[c].stride_bytes * LP_BUILD_CHUNK;
     /* Ordering takes two more keys and places a voxel. */
-    uint64_t all = build->stream_bytes + bytes + (build->count + LP_BUILD_CHUNK) * 24;
+    uint64_t all = build->stream_bytes + bytes + intended * 24;
     if (build->params.memory_limit_bytes && all > build->params.memory_limit_bytes)
         return lp_fail(err, LP_LIMIT, "",
                        "more than %llu voxels need over %llu MiB of memory: "
@@ -186,7 +181,7 @@ enum lp_code lp_build_push(struct lp_build *build, const struct lp_voxel *voxels
     enum lp_code code = check_voxels(build, voxels, extra_rgb_lin, count, err);
     while (code == LP_OK &&
            (build->count + count + LP_BUILD_CHUNK - 1) / LP_BUILD_CHUNK > build->chunk_count)
-        code = add_chunk(build, err);
+        code = add_chunk(build, build->count + count, err);
     if (code != LP_OK)
         return code;
     for (size_t i = 0; i < count; i++) {
@@ -414,6 +409,8 @@ static enum lp_code build_levels(struct finish *f)
     uint32_t wide_levels = f->scene.tree.wide_levels;
     enum lp_code code = step(f, "building levels", wide_levels);
     for (uint32_t k = 0; k < wide_levels && code == LP_OK; k++) {
+        if (lp_progress_cancelled(f->build->params.progress))
+            return lp_fail(f->err, LP_CANCELLED, "", "cancelled");
         uint64_t children = f->scene.tree.level_count[2 * k];
         task->wide = (struct lp_wide_node *)(uintptr_t)f->scene.tree.wide[k]; /* our memory */
         run_pass(f, LP_BUILD_COUNT_WIDE, children);

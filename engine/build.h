@@ -57,9 +57,6 @@ LP_MUST_CHECK enum lp_code lp_build_push(struct lp_build *build, const struct lp
 LP_MUST_CHECK enum lp_code lp_build_finish(void **out, size_t *out_bytes, struct lp_build *build,
                                            struct lp_error *err);
 
-/* How many voxels were pushed so far, duplicates counted. */
-uint64_t lp_build_pushed(const struct lp_build *build);
-
 /* Accepts NULL and sets it. */
 void lp_build_destroy(struct lp_build **build);
 

@@ -23,7 +23,7 @@ struct lp_build_order {
     uint32_t *places;
 };
 
-/* Colour and weight of a node on the way up. */
+/* Colour of a node on the way up. */
 struct lp_build_sum {
     float rgb[3];
 };

@@ -6,7 +6,7 @@
 
 #include <stdatomic.h>
 
-struct lp_build_task; /* engine/build.c: one pass of building a tree */
+struct lp_build_task; /* engine/build_task.h: one pass of building a tree */
 
 /* A pass of work cut into independent parts. The arm is chosen by `kind`. */
 enum lp_task_kind { LP_TASK_BUILD };
@@ -32,7 +32,7 @@ struct lp_executor {
 struct lp_executor *lp_executor_serial(void);
 
 /* How far long work has come. Written by the engine, read by any thread that shows it; `cancelled`
- * is written by the caller and polled between parts. All zero to begin with. */
+ * is written by the caller and polled between passes and rows. All zero to begin with. */
 struct lp_progress {
     _Atomic uint64_t done, total; /* units of the phase; total 0 = not known */
     _Atomic(const char *) phase;  /* static string, NULL before the first */

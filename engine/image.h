@@ -22,7 +22,8 @@ struct lp_pixels {
     const float *rgb_lin; /* 3 * width_px * height_px, the caller's */
 };
 
-/* Encodes into a fresh block `*out` of `*out_bytes`, to be given to free(). LP_NO_MEMORY, LP_IO. */
+/* Encodes into a fresh block `*out` of `*out_bytes`, to be given to free(). LP_INVALID,
+ * LP_NO_MEMORY, LP_IO. */
 LP_MUST_CHECK enum lp_code lp_image_encode(uint8_t **out, size_t *out_bytes,
                                            enum lp_image_format format,
                                            const struct lp_pixels *pixels, struct lp_error *err);

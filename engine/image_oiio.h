@@ -1,7 +1,8 @@
 /* The thin C face of the C++ shim around OpenImageIO; private to image.c and its tests.
  *
- * No exception leaves the shim and nothing is printed. The library's global settings (no threads
- * of its own, no messages) are made once, by whoever comes first. Thread: any. */
+ * No exception leaves the shim and nothing is printed (but one line by libpng itself
+ * for a PNG whose checksums hold and whose compressed data do not). The library's global settings
+ * (no threads of its own, no messages) are made once, by whoever comes first. Thread: any. */
 #ifndef LP_IMAGE_OIIO_H
 #define LP_IMAGE_OIIO_H
 

@@ -17,6 +17,7 @@ struct lp_heightmap_params {
     double voxel_m;               /* 0: size_m / 2^depth */
     uint8_t depth;                /* 0: LP_IMPORT_DEPTH_DEFAULT */
     enum lp_filter filter;        /* 0: visible */
+    uint64_t memory_limit_bytes;  /* of the voxels on their way; 0: none. LP_LIMIT beyond it */
     struct lp_executor *executor; /* NULL: serial */
     struct lp_progress *progress; /* NULL: none */
 };

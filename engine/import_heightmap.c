@@ -201,7 +201,8 @@ static enum lp_code create_build(struct heightmap *import, struct lp_error *err)
                                     .voxel_size_m = import->voxel_m,
                                     .origin_m = {corner_m, 0.0, corner_m},
                                     .executor = params->executor,
-                                    .progress = params->progress};
+                                    .progress = params->progress,
+                                    .memory_limit_bytes = params->memory_limit_bytes};
     enum lp_code code = lp_build_create(&import->build, &build, err);
     return code == LP_OK ? lp_batch_create(&import->batch, import->build, err) : code;
 }
@@ -231,7 +232,9 @@ static enum lp_code fail_too_high(const struct heightmap *import, double height_
     return lp_fail(err, LP_LIMIT, "--height-m",
                    "the relief reaches %.6g m, but the cube is %.6g m high; give a lower "
                    "--height-m or a larger --voxel-m (%.6g holds it)",
-                   height_m, cube_m, import->params->height_m / import->side_vox);
+                   height_m, cube_m,
+                   /* rounded up, so that what is printed does hold it */
+                   import->params->height_m / import->side_vox * (1 + 1e-5));
 }
 
 /* Row z of columns: how high each rises and which voxel is its top. */

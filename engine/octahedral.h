@@ -4,7 +4,8 @@
 
 #include <stdint.h>
 
-/* The nearest code of a direction of any length; zero and NaN give +Y. Low byte u, high byte v,
+/* The code of the nearest direction, for one of any length ("precise" in the paper: the best of
+ * the four codes around the point); zero and NaN give +Y. Low byte u, high byte v,
  * both two's complement in -127..127. Thread: any. */
 uint16_t lp_oct16_encode(const float direction[3]);
 /* Unit vector of any code. Thread: any. */

@@ -29,8 +29,9 @@ static enum lp_code check_view(const struct lp_render_params *params, struct lp_
         return lp_fail(err, LP_INVALID, "samples_per_axis", "is %u, it must be 1 to %d",
                        params->samples_per_axis, LP_SAMPLES_PER_AXIS_MAX);
     for (int c = 0; c < 3; c++)
-        if (!isfinite(params->environment[c]) || params->environment[c] < 0)
-            return lp_fail(err, LP_INVALID, "environment", "radiance must be finite and >= 0");
+        if (!(params->environment[c] >= 0 && params->environment[c] <= LP_RADIANCE_MAX))
+            return lp_fail(err, LP_INVALID, "environment", "radiance must be 0 to %g",
+                           (double)LP_RADIANCE_MAX);
     return LP_OK;
 }
 

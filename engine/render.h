@@ -12,9 +12,10 @@
 
 #define LP_FACE_PX_MAX          4096
 #define LP_SAMPLES_PER_AXIS_MAX 32
-#define LP_TILE_PX              32 /* edge of a tile; the last ones of a face may be cut */
-#define LP_LEVEL_CLASSES        9  /* refinement 0..8 below the cone's level */
-#define LP_RAY_CLASSES          3  /* the thesis's 1, 4 and 16 rays */
+#define LP_TILE_PX              32       /* edge of a tile; the last ones of a face may be cut */
+#define LP_RADIANCE_MAX         65504.0f /* of an environment: the largest half float */
+#define LP_LEVEL_CLASSES        9        /* refinement 0..8 below the cone's level */
+#define LP_RAY_CLASSES          3        /* the thesis's 1, 4 and 16 rays */
 
 enum lp_mode {
     LP_MODE_REFERENCE, /* n * n rays a pixel at the finest level */
@@ -34,7 +35,7 @@ struct lp_render_params {
     enum lp_face faces[LP_FACE_COUNT]; /* which, in film order, each once */
     const char *lighting;              /* a lighting of the scene */
     double position_m[3];              /* the probe, world */
-    float environment[3];              /* linear radiance of a ray that leaves, >= 0 */
+    float environment[3];              /* linear radiance of a ray that leaves, 0..65504 */
 };
 
 /* What to do, checked. A value: copy it freely; valid as long as the scene. */
@@ -97,8 +98,8 @@ void lp_counters_add(struct lp_counters *sum, const struct lp_counters *part);
 /* Bits of enum lp_probe_warning for a place in the world. */
 unsigned lp_probe_warnings(const struct lp_scene *scene, const double position_m[3]);
 
-/* A place from which a newcomer sees something; in the world. Deterministic; some ten thousand
- * rays. */
+/* A place from which a newcomer sees something; in the world. Deterministic; tens
+ * of thousands of rays for a landscape, 600,000 at most. */
 void lp_probe_suggest(double out_m[3], const struct lp_scene *scene);
 
 /* SHA-256 over the film's layers: radiance as little-endian float32, in film order. */

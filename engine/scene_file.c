@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define XXH_STATIC_LINKING_ONLY
+#define XXH_STATIC_LINKING_ONLY /* the state's size, to have it on the stack */
 #include <xxhash.h>
 
 #if __BYTE_ORDER__ != __ORDER_LITTLE_ENDIAN__
@@ -68,16 +68,12 @@ static uint64_t section_end(const struct file_section *table, uint32_t count, ui
 static uint64_t head_checksum(const uint8_t *bytes, uint64_t head_bytes)
 {
     static const uint8_t zeros[8];
-    XXH3_state_t *state = XXH3_createState();
-    if (!state)
-        return 0;
-    XXH3_64bits_reset(state);
-    XXH3_64bits_update(state, bytes, CHECKSUM_FIELD);
-    XXH3_64bits_update(state, zeros, sizeof zeros);
-    XXH3_64bits_update(state, bytes + CHECKSUM_FIELD + 8, (size_t)head_bytes - CHECKSUM_FIELD - 8);
-    uint64_t sum = XXH3_64bits_digest(state);
-    XXH3_freeState(state);
-    return sum;
+    XXH3_state_t state;
+    XXH3_64bits_reset(&state);
+    XXH3_64bits_update(&state, bytes, CHECKSUM_FIELD);
+    XXH3_64bits_update(&state, zeros, sizeof zeros);
+    XXH3_64bits_update(&state, bytes + CHECKSUM_FIELD + 8, (size_t)head_bytes - CHECKSUM_FIELD - 8);
+    return XXH3_64bits_digest(&state);
 }
 
 /* ---- writing -----------------------------------------------------------------------------------
@@ -305,7 +301,8 @@ static enum lp_code check_entry(const struct file_header *header, const struct f
     uint64_t nodes = 0;
     for (uint32_t level = 0; level <= header->depth; level++)
         nodes += header->level_count[level];
-    if (section->offset != *at || section->bytes > header->file_bytes - *at)
+    if (*at > header->file_bytes || section->offset != *at ||
+        section->bytes > header->file_bytes - *at)
         return lp_fail(err, LP_CORRUPT, "section table",
                        "section %u lies at %llu with %llu bytes, "
                        "where %llu is due",
@@ -356,7 +353,7 @@ static enum lp_code check_table(const struct file_header *header, const struct f
     return LP_OK;
 }
 
-/* Every byte of every section, then what the bytes mean. */
+/* Every byte of every section: checksums, and zeros between them. */
 static enum lp_code check_content(const uint8_t *bytes, size_t byte_count,
                                   const struct file_header *header,
                                   const struct file_section *table, struct lp_error *err)

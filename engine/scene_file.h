@@ -52,9 +52,10 @@ struct lp_scene_file {
     size_t bytes;
 };
 
-/* Maps `path` and checks it. LP_IO: cannot be read. LP_CORRUPT / LP_UNSUPPORTED: one sentence that
- * names the defect and its place. `*file` is untouched on failure. With LP_TRUST_CONTENT it costs
- * microseconds. The file must not be changed in place while it is open. Thread: any. */
+/* Maps `path` and checks it. LP_NOT_FOUND, LP_IO: cannot be read. LP_CORRUPT / LP_UNSUPPORTED: one
+ * sentence that names the defect and its place. `*file` is untouched on failure. With
+ * LP_TRUST_CONTENT it costs microseconds. The file must not be changed in place while it is open.
+ * Thread: any. */
 LP_MUST_CHECK enum lp_code lp_scene_file_open(struct lp_scene_file *file, const char *path,
                                               enum lp_trust trust, struct lp_error *err);
 
@@ -71,7 +72,7 @@ LP_MUST_CHECK enum lp_code lp_scene_view(struct lp_scene *scene, const void *byt
 LP_MUST_CHECK enum lp_code lp_scene_file_write(const char *path, const void *bytes,
                                                size_t byte_count, struct lp_error *err);
 
-/* A channel's place in a new file. */
+/* What decides the size of a new file: its levels and channels. */
 struct lp_scene_layout {
     uint8_t depth;
     uint32_t level_count[LP_LEVEL_COUNT_MAX];

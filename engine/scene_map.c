@@ -83,7 +83,7 @@ static enum lp_code sync_folder(const char *path, struct lp_error *err)
     char folder[4096];
     const char *slash = strrchr(path, '/');
     size_t length = slash ? (size_t)(slash - path) + 1 : 0;
-    if (length >= sizeof folder)
+    if (length + 2 > sizeof folder)
         return lp_fail(err, LP_IO, path, "the path is too long");
     memcpy(folder, path, length);
     memcpy(folder + length, ".", 2);

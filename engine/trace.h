@@ -9,8 +9,9 @@
  * not. Direction components below LP_RAY_PARALLEL in size count as zero.
  *  4. A node covers t_in = max(0, its three near planes) to t_out = min(its three far planes);
  *     it is hit where t_in < t_out. Distinct cells have disjoint intervals, so there are no ties.
- *  5. The face that is hit belongs to the lowest axis whose near plane equals t_in; a ray that
- *     starts inside the node has none.
+ *  5. The face that is hit belongs to the lowest axis whose near plane is crossed at t_in, also at
+ *     t_in = 0 by a ray that starts on that plane; where no near plane is (the ray starts further
+ *     inside), there is none.
  *  6. Steps: the root's test is one, hit or miss; then every node that is there and is entered
  *     (4) before or at the hit, by the plain top-down walk.
  *
@@ -30,7 +31,7 @@ enum lp_face { /* cubemap order; also the face of a node that a ray enters throu
                LP_FACE_NEG_Y,
                LP_FACE_POS_Z,
                LP_FACE_NEG_Z,
-               LP_FACE_NONE /* the ray starts inside */
+               LP_FACE_NONE /* rule 5: no near plane is crossed at t_in */
 };
 
 struct lp_ray {

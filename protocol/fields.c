@@ -368,6 +368,7 @@ const struct wire_field wire_fields[] = {
      .doc = "which field is searched"},
 };
 const size_t wire_field_count = sizeof wire_fields / sizeof wire_fields[0];
+_Static_assert(sizeof wire_fields / sizeof wire_fields[0] <= 64, "fields seen fit 64 bits");
 
 const struct wire_field *wire_field_find(const char *name)
 {

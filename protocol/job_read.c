@@ -476,6 +476,6 @@ enum wire_problem_code wire_job_read(struct wire_job *job, struct wire_problem *
                                 "there is no memory left to read the job; try again later");
     }
     if (problem->code == WIRE_PROBLEM_NONE)
-        *job = draft;
+        memcpy(job, &draft, sizeof draft); /* padding too */
     return problem->code;
 }

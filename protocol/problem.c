@@ -60,7 +60,8 @@ void wire_problem_field(struct wire_problem *problem, const char *pointer, const
         return;
     problem->code = WIRE_PROBLEM_INVALID_FIELD;
     for (uint32_t i = 0; i < problem->error_count; i++)
-        if (strcmp(problem->errors[i].pointer, pointer) == 0)
+        if (strcmp(problem->errors[i].pointer, pointer) == 0 &&
+            strlen(pointer) + 1 < sizeof problem->errors[i].pointer) /* a cut one may be another */
             return; /* one sentence for a place: the first */
 
     if (problem->error_count < WIRE_FIELD_ERRORS_MAX) {

@@ -1,6 +1,8 @@
 /* The reader of single fields: a thin face over cJSON's tree. */
 #include "protocol/read.h"
 
+#include "protocol/text.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,7 +11,6 @@
 #include <cjson/cJSON.h>
 
 #define INTEGER_MAX   9007199254740992.0 /* 2^53 */
-#define NUMBER_BYTES  40
 #define PRINT_NESTING 64
 
 struct wire_read {
@@ -166,12 +167,12 @@ static bool numbers_to_raw(cJSON *node, unsigned depth)
     if (depth > PRINT_NESTING)
         return false;
     if (cJSON_IsNumber(node)) {
-        char text[NUMBER_BYTES];
+        char text[WIRE_NUMBER_BYTES];
         double number = node->valuedouble;
         if (isinf(number)) /* 1e999 in the source: stays out of range for whoever reads it next */
             snprintf(text, sizeof text, "%s1e999", number < 0 ? "-" : "");
         else
-            snprintf(text, sizeof text, "%.17g", number);
+            wire_number_text(text, number);
         char *raw = cJSON_malloc(strlen(text) + 1);
         if (!raw)
             return false;

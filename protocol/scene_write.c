@@ -46,7 +46,7 @@ static void write_scene(struct wire_tree *tree, const struct wire_scene *scene)
 {
     wire_tree_text(tree, "name", scene->name);
     wire_tree_text(tree, "state", state_text(scene->state));
-    if (scene->reason[0] && scene->state == WIRE_SCENE_FAILED)
+    if (scene->reason[0])
         wire_tree_text(tree, "reason", scene->reason);
     if (scene->state != WIRE_SCENE_READY)
         return;

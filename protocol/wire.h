@@ -200,7 +200,7 @@ struct wire_channel {
 struct wire_scene {
     char name[WIRE_NAME_BYTES];
     enum wire_scene_state state;
-    char reason[512]; /* FAILED: why */
+    char reason[512]; /* FAILED: why; else why its file cannot be taken in just now; or empty */
     uint64_t voxels, nodes, bytes;
     uint32_t depth;
     char filter[16];

@@ -92,6 +92,13 @@ static enum lp_code check_usage(struct build_options *options, struct lp_error *
     return LP_OK;
 }
 
+/* Four fifths of the machine's memory: beyond that the system would end us, or somebody else. */
+static uint64_t memory_limit_bytes(void)
+{
+    long pages = sysconf(_SC_PHYS_PAGES), page_bytes = sysconf(_SC_PAGESIZE);
+    return pages > 0 && page_bytes > 0 ? (uint64_t)pages / 5 * 4 * (uint64_t)page_bytes : 0;
+}
+
 static enum lp_code import_source(void **bytes, size_t *byte_count,
                                   const struct build_options *options, struct pool *pool,
                                   struct lp_progress *progress, struct lp_error *err)
@@ -115,6 +122,7 @@ static enum lp_code import_source(void **bytes, size_t *byte_count,
         .voxel_m = options->voxel_m,
         .depth = (uint8_t)options->depth,
         .filter = options->filter,
+        .memory_limit_bytes = memory_limit_bytes(),
         .executor = pool_executor(pool),
         .progress = progress,
     };

@@ -4,9 +4,11 @@
 #include <arpa/inet.h>
 #include <dirent.h>
 #include <netinet/in.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -103,7 +105,7 @@ static bool ends_headers(const char *text, size_t length)
 }
 
 /* Answers `count` connections with `answer`, one request each, and ends. The child is waited for by
- * nobody: it goes with its parent's process group, or after the last answer. */
+ * nobody: it goes with its parent, or after the last answer. */
 static void serve(struct canned *canned, const char *answer, size_t bytes, int count)
 {
     unsigned port;
@@ -112,7 +114,8 @@ static void serve(struct canned *canned, const char *answer, size_t bytes, int c
     fflush(NULL);
     canned->child = fork();
     if (canned->child == 0) {
-        alarm(60);
+        prctl(PR_SET_PDEATHSIG, SIGKILL);
+        alarm(60); /* should the parent have gone already */
         for (int i = 0; i < count; i++) {
             int connection = accept(listener, NULL, NULL);
             char request[4096];

@@ -3,6 +3,7 @@
 import json
 import os
 import random
+import subprocess
 import unittest
 
 import harness
@@ -42,6 +43,18 @@ class Usage(unittest.TestCase):
                 self.assertEqual(len(done.err.strip().splitlines()), 1, done.err)
                 self.assertTrue(done.err.startswith("lightprobe"), done.err)
                 self.assertGreater(len(done.err), 25)
+
+
+class FullDisk(unittest.TestCase):
+    def test_output_that_does_not_arrive_is_a_failure(self):
+        room = scenes() / "room.lps"
+        for args in (["--help"], ["info", room], ["verify", room]):
+            with open("/dev/full", "wb") as full:
+                done = subprocess.run([str(harness.BUILD / "lightprobe"), *map(str, args)],
+                                      stdout=full, stderr=subprocess.PIPE,
+                                      env=harness.ENVIRONMENT, timeout=60)
+            self.assertEqual(done.returncode, 1, args)
+            self.assertIn(b"standard output", done.stderr)
 
 
 class Build(unittest.TestCase):
@@ -281,7 +294,6 @@ class Render(unittest.TestCase):
     def test_a_full_disk_is_said(self):
         if not os.path.exists("/dev/full"):
             self.skipTest("no /dev/full here")
-        import subprocess
 
         with open("/dev/full", "w") as full:
             done = subprocess.run([str(harness.BUILD / "lightprobe"), "info", "--json",

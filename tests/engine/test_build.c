@@ -365,6 +365,26 @@ TEST(octahedral_codes_stay_close_to_the_direction)
             continue;
         lp_oct16_decode(back, lp_oct16_encode(d));
         float dot = (d[0] * back[0] + d[1] * back[1] + d[2] * back[2]) / length;
-        CHECK(dot > 0.9998f); /* 1.1 degrees: a step of 1/127 on the octahedron */
+        CHECK(dot > 0.99993f); /* 0.7 degrees: half a step of 1/127 on the octahedron, twice */
+    }
+}
+
+TEST(octahedral_codes_are_the_nearest_of_all)
+{
+    test_random r = test_random_begin();
+    for (int i = 0; i < 300; i++) {
+        float d[3], back[3];
+        for (int a = 0; a < 3; a++)
+            d[a] = (float)(test_random_unit(&r) * 2 - 1);
+        lp_oct16_decode(back, lp_oct16_encode(d));
+        float got = d[0] * back[0] + d[1] * back[1] + d[2] * back[2], best = -2;
+        for (uint32_t code = 0; code < 65536; code++) {
+            if ((code & 0xff) == 0x80 || code >> 8 == 0x80)
+                continue; /* -128 is not used */
+            lp_oct16_decode(back, (uint16_t)code);
+            float dot = d[0] * back[0] + d[1] * back[1] + d[2] * back[2];
+            best = dot > best ? dot : best;
+        }
+        CHECK_NEAR(got, best, 1e-6);
     }
 }

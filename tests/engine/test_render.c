@@ -4,9 +4,11 @@
 #include "tests/engine/small_scene.h"
 #include "tests/harness/test.h"
 
+#include <fenv.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <xmmintrin.h>
 
 static struct lp_render_params all_faces(enum lp_mode mode, uint32_t face_px)
 {
@@ -185,4 +187,83 @@ TEST(probes_in_bad_places_are_noticed)
     CHECK_EQ(lp_probe_warnings(&small.scene, (double[]){3.5, -0.5, 5.5}), LP_PROBE_OUTSIDE_SCENE);
     CHECK_EQ(lp_probe_warnings(&small.scene, (double[]){16, 5.5, 5.5}), LP_PROBE_OUTSIDE_SCENE);
     small_scene_finish(&small);
+}
+
+TEST(the_films_hash_is_over_all_of_its_floats)
+{
+    float values[6 * 4 * 3] = {0};
+    struct lp_film film = {.face_px = 2, .face_count = 6, .radiance = values};
+    uint8_t first[LP_SHA256_BYTES], other[LP_SHA256_BYTES];
+    /* SHA-256 of 288 zero bytes (any calculator). */
+    static const uint8_t zeros[4] = {0x2d, 0x55, 0x65, 0xfb};
+    lp_film_sha256(first, &film);
+    CHECK(memcmp(first, zeros, sizeof zeros) == 0);
+    for (int i = 0; i < 72; i++) {
+        values[i] = 1.0f;
+        lp_film_sha256(other, &film);
+        CHECK(memcmp(first, other, sizeof first) != 0);
+        values[i] = 0.0f;
+    }
+}
+
+TEST(a_render_thread_begins_with_its_own_arithmetic)
+{
+    volatile float tiny = 0x1p-126f, one = 1.0f, third = 3.0f;
+    fesetround(FE_UPWARD);
+    _mm_setcsr(_mm_getcsr() | 0x8040u); /* denormals flushed, and taken for zero */
+    CHECK(tiny / 2 == 0.0f && one / third > 0x1.555554p-2f);
+    lp_render_thread_begin();
+    CHECK(tiny / 2 == 0x1p-127f);
+    CHECK(one / third == 0x1.555556p-2f);
+    CHECK_EQ(fegetround(), FE_TONEAREST);
+    fesetround(FE_DOWNWARD);
+    CHECK(one / third == 0x1.555554p-2f); /* that the mode makes a difference here */
+    lp_render_thread_begin();
+    CHECK(one / third == 0x1.555556p-2f);
+}
+
+static struct lp_counters look(const struct lp_scene *scene, const double at[3])
+{
+    struct lp_render_params p = all_faces(LP_MODE_LOD, 16);
+    struct lp_render_plan plan;
+    struct lp_film film;
+    struct lp_error error = {0};
+    memcpy(p.position_m, at, sizeof p.position_m);
+    REQUIRE(lp_render_prepare(&plan, scene, &p, &error) == LP_OK);
+    struct lp_counters counts = render(&film, &plan, false);
+    free(film.radiance);
+    return counts;
+}
+
+/* A floor, a closed room, a hollow ball above a floor: the suggested place is in the open, or else
+ * inside, never in matter, and matter and (in the open) sky are in view. */
+TEST(suggested_probes_see_something)
+{
+    enum { SIDE = 64 };
+    static struct lp_voxel voxels[3 * SIDE * SIDE * 6];
+    for (int kind = 0; kind < 3; kind++) {
+        uint32_t n = 0;
+        for (uint32_t x = 0; x < SIDE; x++)
+            for (uint32_t y = 0; y < SIDE; y++)
+                for (uint32_t z = 0; z < SIDE; z++) {
+                    int dx = (int)x - 32, dy = (int)y - 36, dz = (int)z - 32;
+                    int r2 = dx * dx + dy * dy + dz * dz;
+                    bool floor = y == (kind == 0 ? (x / 8 + z / 16) % 5 : 0);
+                    bool wall = x == 0 || z == 0 || y == 63 || x == 63 || z == 63;
+                    bool ball = r2 <= 400 && r2 > 324;
+                    if (floor || (kind == 1 && wall) || (kind == 2 && ball))
+                        voxels[n++] = (struct lp_voxel){x, y, z, {200, 100, 50}};
+                }
+        struct small_scene small;
+        small_scene_make(&small, 6, voxels, n);
+        const double *at = small.scene.suggested_probe_m;
+        CHECK_EQ(lp_probe_warnings(&small.scene, at), 0);
+        struct lp_counters counts = look(&small.scene, at);
+        double seen = (double)counts.rays_hit / (double)counts.rays;
+        if (kind == 1)
+            CHECK(seen == 1.0);
+        else
+            CHECK(seen > 0.3 && seen < 1.0);
+        small_scene_finish(&small);
+    }
 }

@@ -1,5 +1,6 @@
 /* Scene files: what went in comes out, every damaged byte is noticed, nothing is half-written. */
 #include "engine/scene_file.h"
+#include "engine/trace.h"
 #include "tests/engine/small_scene.h"
 #include "tests/harness/test.h"
 
@@ -8,6 +9,7 @@
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -66,17 +68,35 @@ TEST(every_flipped_bit_of_a_file_is_noticed)
     small_scene_finish(&small);
 }
 
+/* Memory whose end is followed by a page that cannot be read: looking past it crashes. */
+struct guarded {
+    uint8_t *pages;
+    size_t bytes;
+};
+
+static struct guarded guarded_make(size_t room)
+{
+    size_t page = (size_t)sysconf(_SC_PAGESIZE), whole = (room + page - 1) / page * page;
+    struct guarded g = {.bytes = whole};
+    g.pages = mmap(NULL, whole + page, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    REQUIRE(g.pages != MAP_FAILED && mprotect(g.pages + whole, page, PROT_NONE) == 0);
+    return g;
+}
+
 TEST(every_truncation_is_refused)
 {
     struct small_scene small;
     make(&small, 5);
     struct lp_error error;
+    struct guarded g = guarded_make(small.byte_count);
     for (size_t count = 0; count < small.byte_count; count++) {
-        void *cut =
-            aligned_alloc(64, (count + 63) / 64 * 64 + 64); /* so that reading past it shows */
+        /* Files are mapped at 64-byte borders at least; the slack is filled with what a reader
+         * would not expect, and multiples of 64 end at the guard. */
+        size_t room = (count + 63) / 64 * 64;
+        uint8_t *cut = g.pages + g.bytes - room;
+        memset(cut, 0xa5, room);
         memcpy(cut, small.bytes, count);
         CHECK_EQ(view(cut, count, &error), LP_CORRUPT);
-        free(cut);
     }
     small_scene_finish(&small);
 }
@@ -106,13 +126,39 @@ static void reseal(uint8_t *bytes, size_t count)
     memcpy(bytes + 24, &sum, 8);
 }
 
-TEST(crafted_files_with_true_checksums_never_lead_astray)
+/* A scene that was accepted: looking at every level of it must stay inside (the sanitizer
+ * watches). */
+static void walk_all(const struct lp_scene *scene)
+{
+    uint32_t side = 1u << scene->tree.depth, step = side > 64 ? side / 64 : 1;
+    struct lp_level_cut cuts[] = {{0, 0}, {1, 0}, {0, 0.1f}};
+    for (uint32_t x = 0; x < side; x += 3 * step)
+        for (uint32_t z = 0; z < side; z += 3 * step) {
+            for (uint8_t level = 0; level <= scene->tree.depth; level++) {
+                lp_node node;
+                float rgb[3];
+                uint32_t cell[3] = {x, (x + z) % side, z};
+                if (lp_octree_find(&node, &scene->tree, cell, level))
+                    for (uint32_t c = 0; c < scene->channel_count; c++)
+                        lp_channel_rgb(rgb, &scene->channels[c],
+                                       lp_octree_attribute(&scene->tree, node));
+            }
+            struct lp_ray ray;
+            struct lp_hit hit;
+            uint64_t steps = 0;
+            lp_ray_init(&ray, (double[]){x + 0.5, side + 1.0, z + 0.5}, (lp_vec3){0, -1, 0});
+            if (lp_trace_closest(&hit, &steps, &scene->tree, &ray, &cuts[x % 3]))
+                CHECK(hit.t_in >= 1 && hit.t_in <= (float)side + 1);
+        }
+}
+
+static void craft_randomly(uint8_t depth)
 {
     struct small_scene small;
-    make(&small, 6);
+    make(&small, depth);
     test_random r = test_random_begin();
     uint8_t *bytes = aligned_alloc(64, small.byte_count);
-    uint32_t refused = 0, rounds = 20000;
+    uint32_t refused = 0, rounds = 10000;
     for (uint32_t i = 0; i < rounds; i++) {
         memcpy(bytes, small.bytes, small.byte_count);
         uint32_t changes = 1 + test_random_below(&r, 3);
@@ -132,22 +178,17 @@ TEST(crafted_files_with_true_checksums_never_lead_astray)
             CHECK(error.text[0] != 0);
             continue;
         }
-        /* Accepted: then walking all of it must stay inside (the sanitizer watches). */
-        for (uint32_t x = 0; x < 64; x += 3)
-            for (uint32_t z = 0; z < 64; z += 3) {
-                lp_node node;
-                float rgb[3];
-                if (lp_octree_find(&node, &scene.tree,
-                                   (uint32_t[]){x % (1u << scene.tree.depth),
-                                                (x + z) % (1u << scene.tree.depth),
-                                                z % (1u << scene.tree.depth)},
-                                   0))
-                    lp_channel_rgb(rgb, &scene.channels[0], lp_octree_attribute(&scene.tree, node));
-            }
+        walk_all(&scene);
     }
     CHECK(refused > rounds / 2 && refused < rounds);
     free(bytes);
     small_scene_finish(&small);
+}
+
+TEST(crafted_files_with_true_checksums_never_lead_astray)
+{
+    craft_randomly(6);
+    craft_randomly(5);
 }
 
 static void put_u32(void *bytes, size_t at, uint32_t value)
@@ -178,6 +219,90 @@ TEST(defects_are_named)
     reseal(bytes, small.byte_count);
     CHECK_EQ(view(bytes, small.byte_count, &error), LP_CORRUPT);
     CHECK_STR(error.where, "depth");
+    small_scene_finish(&small);
+}
+
+/* One field changed, checksums made true again: the check that stands for it alone must speak. */
+static void check_crafted(const struct small_scene *small, size_t at, uint32_t value,
+                          const char *where, const char *piece)
+{
+    uint8_t *bytes = aligned_alloc(64, small->byte_count);
+    struct lp_error error;
+    memcpy(bytes, small->bytes, small->byte_count);
+    put_u32(bytes, at, value);
+    reseal(bytes, small->byte_count);
+    CHECK_EQ(view(bytes, small->byte_count, &error), LP_CORRUPT);
+    CHECK_STR(error.where, where);
+    CHECK_HAS(error.text, piece);
+    free(bytes);
+}
+
+static uint32_t get_u32(const void *bytes, size_t at)
+{
+    uint32_t value;
+    memcpy(&value, (const uint8_t *)bytes + at, sizeof value);
+    return value;
+}
+
+TEST(every_check_of_a_crafted_file_stands_alone)
+{
+    struct small_scene small;
+    make(&small, 5);
+    const size_t table = 512, nodes = 512 + 4 * 160, levels = 128;
+    const size_t first = (nodes + 63) / 64 * 64; /* wide level 0: mask, child_first, mid_first */
+    REQUIRE(get_u32(small.bytes, 120) == 4 && small.scene.tree.wide_count[0] > 2);
+    CHECK_EQ(get_u32(small.bytes, table + 16), first);
+    check_crafted(&small, first + 16 + 8, 9999, "nodes", "points to children 9999");
+    check_crafted(&small, first + 16 + 12, 9999, "nodes", "points to children");
+    check_crafted(&small, first, get_u32(small.bytes, first) ^ 1, "nodes", "");
+    check_crafted(&small, levels + 4, get_u32(small.bytes, levels + 4) + 1, "albedo", "one value");
+    check_crafted(&small, levels + 8, get_u32(small.bytes, levels + 8) + 1, "section table",
+                  "does not hold");
+    check_crafted(&small, levels + 6 * 4, 1, "level_count", "level 6 of 5");
+    check_crafted(&small, levels + 5 * 4, 2, "albedo", "one value");
+    check_crafted(&small, 16, (uint32_t)small.byte_count - 64, "file_bytes", "cut");
+    check_crafted(&small, 36, 7, "filter", "unknown");
+    check_crafted(&small, 72, small.scene.bounds_min_vox[0] + 1, "bounds_vox", "axis 0");
+    check_crafted(&small, 84 + 8, small.scene.bounds_max_vox[2] - 1, "bounds_vox", "axis 2");
+    check_crafted(&small, 124, 1, "header", "zero");
+    check_crafted(&small, 508, 1, "header", "zero");
+    check_crafted(&small, 120, 3, "section_count", "does not fit depth 5");
+    check_crafted(&small, table + 3 * 160 + 8, 2, "albedo", "unknown");
+    check_crafted(&small, table + 3 * 160 + 24, 30, "albedo", "one value");
+    check_crafted(&small, table + 3 * 160 + 144, 1, "section table", "must be zero");
+    check_crafted(&small, table + 160, 2, "section table", "does not hold");
+    check_crafted(&small, (size_t)small.byte_count - 4, 1, "channel albedo", "padding");
+    small_scene_finish(&small);
+}
+
+/* Changes that keep all sums as they are, so that only the last check can speak. */
+TEST(crafted_files_whose_sums_hold_are_refused_too)
+{
+    struct small_scene small;
+    make(&small, 5);
+    const size_t levels = 128;
+    uint32_t level_1 = get_u32(small.bytes, levels + 4),
+             level_3 = get_u32(small.bytes, levels + 12);
+    put_u32(small.bytes, levels + 12, level_3 - 1);
+    check_crafted(&small, levels + 4, level_1 + 1, "nodes", "the header counts");
+    put_u32(small.bytes, levels + 12, level_3);
+    /* Odd depth: all of the scene in octant 1 of the coarsest wide node, outside of the cube. */
+    size_t coarsest =
+        (size_t)((const uint8_t *)small.scene.tree.wide[2] - (const uint8_t *)small.bytes);
+    uint32_t mask = get_u32(small.bytes, coarsest);
+    REQUIRE(mask < 256);
+    check_crafted(&small, coarsest, mask << 8, "nodes", "outside of the cube");
+    /* 64 zeros more at the end, under the last section's checksum. */
+    size_t longer = small.byte_count + 64;
+    uint8_t *bytes = aligned_alloc(64, longer);
+    struct lp_error error;
+    memset(bytes, 0, longer);
+    memcpy(bytes, small.bytes, small.byte_count);
+    put_u32(bytes, 16, (uint32_t)longer);
+    reseal(bytes, longer);
+    CHECK_EQ(view(bytes, longer, &error), LP_CORRUPT);
+    CHECK_STR(error.where, "file_bytes");
+    free(bytes);
     small_scene_finish(&small);
 }
 

@@ -300,6 +300,12 @@ TEST(trace_gives_distance_and_face_of_one_voxel)
     struct lp_hit inside = must_hit(&small.scene, 5.5, 6.5, 7.5, down[0]);
     CHECK_EQ(inside.face, LP_FACE_NONE);
     CHECK(inside.t_in == 0.0f);
+    /* On a near plane the ray enters through it; on a far one it has left already. */
+    struct lp_hit on_plane = must_hit(&small.scene, 5.0, 6.5, 7.5, down[1]);
+    CHECK_EQ(on_plane.face, LP_FACE_NEG_X);
+    CHECK(on_plane.t_in == 0.0f);
+    struct lp_hit on_two = must_hit(&small.scene, 6.0, 7.0, 7.5, (lp_vec3){-0.6f, -0.8f, 0});
+    CHECK_EQ(on_two.face, LP_FACE_POS_X); /* the lowest axis */
     small_scene_finish(&small);
 }
 

@@ -90,7 +90,7 @@ TEST(read_sets_and_replaces_members)
     CHECK(wire_read_set_json(read, "p", "[[1,2.5,-3]]"));
     CHECK(!wire_read_set_json(read, "q", "[1,"));
     char *text = wire_read_print(wire_read_root(read));
-    CHECK_STR(text, "{\"b\":{\"c\":0.10000000000000001},\"a\":\"say \\\"hi\\\"\","
+    CHECK_STR(text, "{\"b\":{\"c\":0.1},\"a\":\"say \\\"hi\\\"\","
                     "\"p\":[[1,2.5,-3]]}");
     free(text);
     wire_read_close(&read);

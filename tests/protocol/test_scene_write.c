@@ -64,8 +64,10 @@ TEST(other_scenes_show_their_state)
         enum wire_scene_state state;
         const char *text;
     } cases[] = {
-        {WIRE_SCENE_LOADING, "{\"name\":\"duned\",\"state\":\"loading\"}"},
-        {WIRE_SCENE_IMPORTING, "{\"name\":\"duned\",\"state\":\"importing\"}"},
+        {WIRE_SCENE_LOADING,
+         "{\"name\":\"duned\",\"state\":\"loading\",\"reason\":\"wide node 3: the mask is 0\"}"},
+        {WIRE_SCENE_IMPORTING,
+         "{\"name\":\"duned\",\"state\":\"importing\",\"reason\":\"wide node 3: the mask is 0\"}"},
         {WIRE_SCENE_FAILED,
          "{\"name\":\"duned\",\"state\":\"failed\",\"reason\":\"wide node 3: the "
          "mask is 0\"}"},
