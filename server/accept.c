@@ -1,6 +1,7 @@
 /* Content negotiation: which of the media types we can make a client's Accept headers want. */
 #include "server/accept.h"
 
+#include <stdbool.h>
 #include <string.h>
 #include <strings.h>
 
@@ -50,10 +51,16 @@ static unsigned range_matches(const char *range, size_t n, const char *offer)
     return n == strlen(offer) && strncasecmp(range, offer, n) == 0 ? 3 : 0;
 }
 
+/* Something, a slash, something. */
+static bool range_is_readable(const char *range, size_t n)
+{
+    const char *slash = n ? memchr(range, '/', n) : NULL;
+    return slash && slash > range && slash + 1 < range + n;
+}
+
 void accept_header(struct accept_choice *choice, const char *value, const char *const *offers,
                    size_t offer_count)
 {
-    choice->header_count++;
     for (const char *at = value; *at;) {
         at = skip_space(at);
         const char *end = at + strcspn(at, ",");
@@ -62,6 +69,7 @@ void accept_header(struct accept_choice *choice, const char *value, const char *
         size_t n = (size_t)(stop - at);
         while (n > 0 && (at[n - 1] == ' ' || at[n - 1] == '\t'))
             n--;
+        choice->range_count += range_is_readable(at, n);
         int quality = parameters ? quality_read(parameters, end) : 1000;
         for (size_t i = 0; i < offer_count && i < ACCEPT_OFFERS_MAX; i++) {
             unsigned match = n ? range_matches(at, n, offers[i]) : 0;
@@ -79,7 +87,7 @@ void accept_header(struct accept_choice *choice, const char *value, const char *
 int accept_best(const struct accept_choice *choice, size_t offer_count)
 {
     int best = -1, quality = 0;
-    if (choice->header_count == 0)
+    if (choice->range_count == 0)
         return offer_count > 0 ? 0 : -1;
     for (size_t i = 0; i < offer_count && i < ACCEPT_OFFERS_MAX; i++) {
         if (choice->quality[i] > quality) {

@@ -6,9 +6,9 @@
 
 #define ACCEPT_OFFERS_MAX 8
 
-/* Quality of each offer, as far as the headers seen so far say. All zero: no header yet. */
+/* Quality of each offer, as far as the headers seen so far say. All zero: no range yet. */
 struct accept_choice {
-    unsigned header_count;
+    unsigned range_count;                    /* readable ones */
     int quality[ACCEPT_OFFERS_MAX];          /* thousandths */
     unsigned specificity[ACCEPT_OFFERS_MAX]; /* 0 none, 1 star, 2 type, 3 exact */
 };
@@ -20,7 +20,8 @@ void accept_header(struct accept_choice *choice, const char *value, const char *
                    size_t offer_count);
 
 /* Index of the offer with the highest quality, the first of equals; -1: none is acceptable.
- * Without any header the first offer. */
+ * Without any readable range (no header, an empty one, rubbish) anything is, and the first offer is
+ * taken. */
 int accept_best(const struct accept_choice *choice, size_t offer_count);
 
 #endif

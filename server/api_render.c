@@ -29,7 +29,7 @@ static void refuse(struct http_request *request, const struct wire_problem *prob
  */
 
 /* Sets space for the results aside; the oldest results make room where they have been readable for
- * long enough. */
+ * long enough, a bounded number at a time. */
 static enum wire_problem_code results_admit(struct server *server, struct wire_problem *problem,
                                             uint64_t bytes)
 {
@@ -40,21 +40,23 @@ static enum wire_problem_code results_admit(struct server *server, struct wire_p
                                 "have %" PRIu64 " MiB here; take fewer pixels or formats",
                                 bytes >> 20, limit >> 20);
     uint64_t now = clock_ns();
-    bool swept = false;
-    while (!results_reserve(server->results, bytes)) {
-        if (!records_make_room(server->records, now)) {
-            uint64_t room_ns = records_room_ns(server->records);
-            return wire_problem_set(
-                problem, WIRE_PROBLEM_DISK_FULL,
-                "the %" PRIu64 " MiB for results are taken by results that clients may still "
-                "read%s; try again later",
-                limit >> 20, room_ns == UINT64_MAX ? " or that are being made" : "");
-        }
-        swept = true;
-    }
-    if (swept)
+    int dropped = 0;
+    bool more = true, fits;
+    while (!(fits = results_reserve(server->results, bytes)) && dropped < RECORDS_EXPIRE_MAX &&
+           (more = records_make_room(server->records, now)))
+        dropped++;
+    if (dropped > 0) /* whether it was enough or not */
         background_sweep(server->background);
-    return WIRE_PROBLEM_NONE;
+    if (fits)
+        return WIRE_PROBLEM_NONE;
+    if (more)
+        return wire_problem_set(problem, WIRE_PROBLEM_BUSY,
+                                "old results are being removed to make room; try again soon");
+    bool none = records_room_ns(server->records) == UINT64_MAX;
+    return wire_problem_set(problem, WIRE_PROBLEM_DISK_FULL,
+                            "the %" PRIu64 " MiB for results are taken by results that clients may "
+                            "still read%s; try again later",
+                            limit >> 20, none ? " or that are being made" : "");
 }
 
 static enum wire_problem_code limits_check(const struct server *server,
@@ -91,20 +93,20 @@ static enum wire_problem_code job_admit(struct http_request *request, struct wir
                                         const struct lp_render_plan *plan)
 {
     struct server *server = request->server;
-    uint64_t memory_bytes = bake_bytes_max(plan, wanted);
+    struct wire_job counted = *wanted; /* with the picture that the Accept adds */
+    bool *formats = counted.images;
+    if (request->offer != OFFER_JSON)
+        formats[offer_images[request->offer]] = true;
+    uint64_t memory_bytes = bake_bytes_max(plan, &counted);
     enum wire_problem_code code = limits_check(server, problem, plan, memory_bytes);
     if (code)
         return code;
-    bool formats[WIRE_IMAGE_KINDS];
-    memcpy(formats, wanted->images, sizeof formats);
-    if (request->offer != OFFER_JSON)
-        formats[offer_images[request->offer]] = true;
     uint64_t reserved_bytes = job_results_bytes_max(plan, formats);
     if ((code = results_admit(server, problem, reserved_bytes)))
         return code;
     struct job *job = job_create(wanted, plan);
     if (job) {
-        memcpy(job->wanted, formats, sizeof job->wanted);
+        memcpy(job->wanted, counted.images, sizeof job->wanted);
         job->scene = scene;
         memcpy(job->scene_sha256, scene->about.scene.sha256, sizeof job->scene_sha256);
         job->memory_bytes = memory_bytes;

@@ -5,10 +5,12 @@
 #include "server/http.h"
 
 #include <stdlib.h>
+#include <unistd.h>
 
-void background_init(struct background *background, uv_loop_t *uv, struct results *results)
+void background_init(struct background *background, uv_loop_t *uv, struct results *results,
+                     int wake_fd)
 {
-    *background = (struct background){.uv = uv, .results = results};
+    *background = (struct background){.uv = uv, .results = results, .wake_fd = wake_fd};
 }
 
 /* ---- long bodies -------------------------------------------------------------------------------
@@ -33,10 +35,14 @@ static void reading_done(uv_work_t *work, int status)
     (void)status; /* nobody cancels them */
     reading->background->readings--;
     reading->done = true;
-    if (reading->request)
-        http_resume(reading->request);
-    else
+    if (!reading->request) {
         reading_free(reading);
+        return;
+    }
+    http_resume(reading->request);
+    /* Resuming alone makes no descriptor of the library readable: the loop has to look. */
+    const uint64_t one = 1;
+    (void)!write(reading->background->wake_fd, &one, sizeof one);
 }
 
 struct reading *background_read(struct background *background, struct http_request *request,

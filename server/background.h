@@ -31,12 +31,16 @@ struct reading {
 struct background {
     uv_loop_t *uv;
     struct results *results;
+    int wake_fd; /* the loop's eventfd, borrowed */
     unsigned readings;
     uv_work_t sweep;
     bool sweeping, sweep_again;
 };
 
-void background_init(struct background *background, uv_loop_t *uv, struct results *results);
+/* `wake_fd` (borrowed) is written to after a request was resumed, so that the loop goes on with it.
+ */
+void background_init(struct background *background, uv_loop_t *uv, struct results *results,
+                     int wake_fd);
 
 /* Reads `text` (taken over) for a request that waits; http_resume follows, and request->reading
  * holds the outcome. NULL: too many at once or no memory, `text` stays the caller's.

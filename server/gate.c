@@ -58,8 +58,6 @@ void gate_header(struct gate *gate, const char *name, const char *value)
         if (strcasecmp(value, "chunked") != 0)
             gate->encoding_foreign = true;
         gate->encoding_count++;
-    } else if (strcasecmp(name, "Expect") == 0) {
-        gate->expect_count++;
     }
 }
 

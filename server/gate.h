@@ -18,7 +18,7 @@ struct gate {
     const char *path;    /* decoded */
     const char *version; /* "HTTP/1.1" */
     size_t header_bytes;
-    unsigned host_count, origin_count, length_count, encoding_count, expect_count;
+    unsigned host_count, origin_count, length_count, encoding_count;
     bool bad_name;         /* a field name that is no token, "Content-Length " say */
     bool lengths_differ;   /* or are no numbers */
     bool encoding_foreign; /* a transfer coding other than chunked */

@@ -3,6 +3,7 @@
 #include "server/http_private.h"
 #include "server/log.h"
 
+#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,8 +14,9 @@
 #include <unistd.h>
 
 #define POOL_BYTES   (32u << 10) /* of a connection: its head, and the buffers of its body */
-#define ACCEPT_RUNS  16
-#define FDS_AT_LEAST 256 /* files, scenes, watches, and the like */
+#define IDLE_TICKS   16          /* between two looks at an idle connection */
+#define RUNS_IN_VAIN 4           /* then the backlog is left */
+#define FDS_AT_LEAST 256         /* files, scenes, watches, and the like */
 
 __attribute__((format(printf, 2, 0))) static void on_library_log(void *cls, const char *format,
                                                                  va_list list)
@@ -81,14 +83,26 @@ fail:
     return lp_fail(err, LP_IO, "http", "the HTTP server cannot be started");
 }
 
+/* Whoever is in the backlog was let in by the system already, and would be reset: accepts them. One
+ * run of the library accepts a few, and none when there are too many connections or descriptors. */
+static void backlog_take(struct http *http)
+{
+    struct pollfd listener = {.fd = http->params.listen_fd, .events = POLLIN};
+    const uint64_t enough = http->totals.accepted + ADDRESS_BACKLOG + 1; /* others may come */
+    int in_vain = 0;
+    while (in_vain < RUNS_IN_VAIN && http->totals.accepted < enough && poll(&listener, 1, 0) > 0) {
+        uint64_t before = http->totals.accepted;
+        MHD_run(http->daemon);
+        in_vain = http->totals.accepted == before ? in_vain + 1 : 0;
+    }
+    MHD_run(http->daemon); /* what the last ones have sent is read by the run after */
+}
+
 void http_quiesce(struct http *http)
 {
     if (http->quiesced)
         return;
-    /* Whoever is in the backlog was let in already, and would be reset: accept them. A run accepts
-     * a few. */
-    for (int i = 0; i < ACCEPT_RUNS; i++)
-        MHD_run(http->daemon);
+    backlog_take(http);
     int listen_fd = MHD_quiesce_daemon(http->daemon);
     if (listen_fd >= 0)
         close(listen_fd);
@@ -101,7 +115,9 @@ void http_stop(struct http **pointer)
     if (!http)
         return;
     http_quiesce(http);
-    /* The library aborts the process when it is stopped with suspended connections. */
+    /* The library aborts the process when it is stopped with suspended connections: wake them, and
+     * let none of those that come to their handler in the last run fall asleep again. */
+    http->stopping = true;
     for (struct http_connection *peer = http->connections; peer; peer = peer->next)
         if (peer->request && peer->request->phase == HTTP_WAITING) {
             peer->request->left = true;
@@ -154,16 +170,36 @@ static bool is_too_slow(const struct http_connection *peer, uint64_t now_ns)
     return false;
 }
 
+/* Whether a client left before its request was whole, or between requests. The library does not see
+ * it when the end of the stream came together with bytes: its epoll tells of both once, and it
+ * reads once. Idle connections, of which there may be many, are looked at less often. */
+static bool has_left(const struct http *http, struct http_connection *peer)
+{
+    const struct http_request *request = peer->request;
+    bool coming = request && (request->phase == HTTP_HEAD || request->phase == HTTP_BODY);
+    if (request ? !coming : (http->ticks + (unsigned)peer->fd) % IDLE_TICKS != 0)
+        return false;
+    /* Seen twice: between two ticks the library takes in all that it has read. */
+    bool ended = peer->ended;
+    char byte;
+    peer->ended = recv(peer->fd, &byte, 1, MSG_PEEK | MSG_DONTWAIT) == 0;
+    return ended && peer->ended;
+}
+
 void http_tick(struct http *http)
 {
     uint64_t now_ns = clock_ns();
+    http->ticks++;
     for (struct http_connection *peer = http->connections; peer; peer = peer->next) {
-        if (peer->cut || !is_too_slow(peer, now_ns))
+        if (peer->cut)
             continue;
-        /* The library sees the end of the stream and cleans up. */
+        bool slow = is_too_slow(peer, now_ns);
+        if (!slow && !has_left(http, peer))
+            continue;
+        /* The library sees the shutdown and cleans up. */
         peer->cut = true;
         (void)shutdown(peer->fd, SHUT_RDWR);
-        http->totals.cut += peer->request != NULL;
+        http->totals.cut += slow && peer->request;
     }
     http_linger_tick(http, now_ns);
 }

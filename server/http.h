@@ -82,7 +82,7 @@ int http_watch_fd(const struct http *http);
 void http_run(struct http *http);
 void http_run_watches(struct http *http);
 int64_t http_timeout_ms(const struct http *http);
-/* A few times a second: cuts clients that are too slow. */
+/* A few times a second: cuts clients that are too slow, or gone. */
 void http_tick(struct http *http);
 
 /* From now on every answer closes its connection. */

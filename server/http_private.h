@@ -22,6 +22,7 @@ struct http_connection {
     int fd;            /* libmicrohttpd's: valid until it says that the connection is closed */
     bool overflow;     /* beyond the limit: told 503 */
     bool cut;          /* shut down by http_tick */
+    bool ended;        /* http_tick found its sending side closed */
     uint64_t since_ns; /* when it became idle */
     struct http_request *request; /* NULL: idle */
 };
@@ -41,9 +42,11 @@ struct http {
     int watch_fd; /* an epoll of waiting clients and lingering sockets */
     bool closing; /* every answer closes its connection */
     bool quiesced;
+    bool stopping; /* no handler runs any more: it could wait */
     struct http_connection *connections;
     struct http_linger *lingers;
     size_t linger_count, pending;
+    uint64_t ticks;
     uint64_t bodies_bytes;
     uint64_t request_number, run; /* of made-up request ids */
     struct http_totals totals;

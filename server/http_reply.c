@@ -37,9 +37,12 @@ static void header_add(struct MHD_Response *response, const char *name, const ch
         (void)MHD_add_response_header(response, name, value);
 }
 
-/* Whether If-None-Match names this strong tag, or anything. */
+/* Whether a GET's or HEAD's If-None-Match names this strong tag, or anything. Of other methods the
+ * condition is not ours to judge: they are done whatever the client knows. */
 static bool tag_is_known(const struct http_request *request, const char *tag)
 {
+    if (strcmp(request->method, "GET") != 0 && strcmp(request->method, "HEAD") != 0)
+        return false;
     const char *list =
         MHD_lookup_connection_value(request->connection, MHD_HEADER_KIND, "If-None-Match");
     if (!list)
@@ -144,12 +147,8 @@ void http_answer(struct http_request *request, struct http_reply *reply)
         snprintf(tag, sizeof tag, "\"%.64s\"", reply->etag_sha256);
     reply->is_file = reply->from_fd;
     if (tag[0] && reply->status == 200 && tag_is_known(request, tag)) {
-        if (reply->from_fd)
-            close(reply->fd);
-        free(reply->text);
-        reply->from_fd = false;
-        reply->text = NULL;
-        reply->bytes = 0;
+        /* The body stays: the library sends none with a 304, but takes Content-Length from it,
+         * which must be the 200's or be absent. */
         reply->status = 304;
         reply->media_type = NULL;
     }

@@ -265,8 +265,8 @@ enum MHD_Result http_on_request(void *cls, struct MHD_Connection *connection, co
     struct http_request *request = *pointer;
     (void)cls;
     (void)connection;
-    if (!request || request->left)
-        return MHD_NO; /* no memory for it, or nobody there: the connection closes */
+    if (!request || request->left || request->http->stopping)
+        return MHD_NO; /* no memory for it, nobody there, or the end: the connection closes */
     request->method = method;
     request->path = url;
     switch (request->phase) {

@@ -53,7 +53,11 @@ static void linger_end(struct http *http, struct http_linger *linger)
     while (*at != linger)
         at = &(*at)->next;
     *at = linger->next;
-    close(linger->fd); /* leaves the epoll with its last descriptor */
+    /* An epoll holds the open file, not the descriptor: while the connection that this one is a
+     * duplicate of is still open, closing alone would leave the entry, and its events would come
+     * with this memory's address. */
+    (void)epoll_ctl(http->watch_fd, EPOLL_CTL_DEL, linger->fd, NULL);
+    close(linger->fd);
     free(linger);
     http->linger_count--;
 }

@@ -9,6 +9,7 @@
 
 struct scene;
 struct http_request;
+struct job_list;
 
 #define JOB_RAYS_MAX UINT64_C(100000000000) /* the contract's default limit on one job */
 
@@ -25,7 +26,8 @@ struct job_picture {
 /* Written by the loop before it is queued (and read-only then), by the workers while they hold it,
  * by the loop again once it came back finished. Owned by the queue in between. */
 struct job {
-    struct job *next; /* guarded by the queue's mutex */
+    struct job *next, *previous; /* guarded by the queue's mutex */
+    struct job_list *list;       /* guarded by the queue's mutex: the queue's it is in, or NULL */
 
     /* Set by the loop before queueing. */
     char id[WIRE_ID_BYTES];
@@ -44,7 +46,6 @@ struct job {
 
     /* Guarded by the queue's mutex. */
     enum job_phase phase;
-    uint64_t arrival;    /* order within a priority */
     uint32_t helpers;    /* workers that render its tiles now */
     uint64_t started_ns; /* first tile */
 

@@ -10,19 +10,18 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/signalfd.h>
 #include <unistd.h>
 
 #define TICK_MS 100
 
 struct loop {
     uv_loop_t uv;
-    uv_poll_t http_poll, watch_poll, wake_poll;
+    uv_poll_t http_poll, watch_poll, wake_poll, signal_poll;
     uv_timer_t http_timer, tick_timer;
-    uv_signal_t terminate, interrupt;
     struct server *server;
-    int wake_fd;
-    bool started, announced;
-    int status;
+    int wake_fd, signal_fd;
+    bool announced;
     uint64_t deadline_ns; /* of the phase */
     unsigned signals;
 };
@@ -67,11 +66,16 @@ static void drain_advance(struct loop *loop)
         uv_stop(&loop->uv);
 }
 
-static void on_signal(uv_signal_t *handle, int number)
+static void on_signal(uv_poll_t *handle, int status, int events)
 {
     struct loop *loop = handle->data;
+    struct signalfd_siginfo signal;
+    (void)status;
+    (void)events;
+    if (read(loop->signal_fd, &signal, sizeof signal) != sizeof signal)
+        return;
     loop->signals++;
-    log_event(LOG_INFO, "signal", "number=%d count=%u", number, loop->signals);
+    log_event(LOG_INFO, "signal", "number=%u count=%u", signal.ssi_signo, loop->signals);
     if (loop->server->phase == SERVER_RUNNING) {
         http_close_after_answers(loop->server->http);
         phase_enter(loop, SERVER_DRAINING, LOOP_DRAIN_S);
@@ -85,7 +89,7 @@ static void on_signal(uv_signal_t *handle, int number)
 static void announce(struct loop *loop)
 {
     struct server *server = loop->server;
-    if (loop->announced || !scenes_scanned(server->scenes))
+    if (loop->announced || server->phase != SERVER_RUNNING || !scenes_scanned(server->scenes))
         return;
     loop->announced = true;
     struct scenes_totals scenes = scenes_totals(server->scenes);
@@ -175,11 +179,24 @@ struct loop *loop_create(struct server *server, int wake_fd)
         return NULL;
     loop->server = server;
     loop->wake_fd = wake_fd;
+    sigset_t signals;
+    sigemptyset(&signals);
+    sigaddset(&signals, SIGTERM);
+    sigaddset(&signals, SIGINT);
+    /* For good: handlers end with the loop, and a signal that comes later would end the process. */
+    if (pthread_sigmask(SIG_BLOCK, &signals, NULL) != 0)
+        goto fail;
+    loop->signal_fd = signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK);
+    if (loop->signal_fd < 0)
+        goto fail;
     if (uv_loop_init(&loop->uv) != 0) {
-        free(loop);
-        return NULL;
+        close(loop->signal_fd);
+        goto fail;
     }
     return loop;
+fail:
+    free(loop);
+    return NULL;
 }
 
 uv_loop_t *loop_uv(struct loop *loop)
@@ -194,25 +211,16 @@ static int poll_begin(struct loop *loop, uv_poll_t *poll, int fd, uv_poll_cb cal
     return failed ? failed : uv_poll_start(poll, UV_READABLE, callback);
 }
 
-static int signal_begin(struct loop *loop, uv_signal_t *signal, int number)
-{
-    int failed = uv_signal_init(&loop->uv, signal);
-    signal->data = loop;
-    return failed ? failed : uv_signal_start(signal, on_signal, number);
-}
-
 int loop_run(struct loop *loop)
 {
     struct server *server = loop->server;
     int failed;
-    loop->started = true;
     server->progress_ns = clock_ns();
     (void)uv_timer_init(&loop->uv, &loop->http_timer);
     (void)uv_timer_init(&loop->uv, &loop->tick_timer);
     loop->http_timer.data = loop;
     loop->tick_timer.data = loop;
-    if ((failed = signal_begin(loop, &loop->terminate, SIGTERM)) ||
-        (failed = signal_begin(loop, &loop->interrupt, SIGINT)) ||
+    if ((failed = poll_begin(loop, &loop->signal_poll, loop->signal_fd, on_signal)) ||
         (failed = poll_begin(loop, &loop->http_poll, http_epoll_fd(server->http), on_http)) ||
         (failed = poll_begin(loop, &loop->watch_poll, http_watch_fd(server->http), on_watch)) ||
         (failed = poll_begin(loop, &loop->wake_poll, loop->wake_fd, on_wake)) ||
@@ -223,7 +231,7 @@ int loop_run(struct loop *loop)
     announce(loop);
     pump(loop);
     uv_run(&loop->uv, UV_RUN_DEFAULT);
-    return loop->status;
+    return 0;
 }
 
 static void close_handle(uv_handle_t *handle, void *unused)
@@ -241,6 +249,7 @@ void loop_destroy(struct loop **pointer)
     uv_walk(&loop->uv, close_handle, NULL);
     uv_run(&loop->uv, UV_RUN_DEFAULT); /* closes the handles, and waits for the pool */
     (void)uv_loop_close(&loop->uv);
+    close(loop->signal_fd);
     free(loop);
     *pointer = NULL;
 }

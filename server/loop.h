@@ -10,7 +10,9 @@
 
 struct loop;
 
-/* NULL: no memory or descriptors. `wake_fd` is the eventfd that other threads write to. */
+/* NULL: no memory or descriptors. `wake_fd` is the eventfd that other threads write to. Blocks
+ * SIGTERM and SIGINT in this thread and in those that it starts from now on, until the end of the
+ * process: loop_run reads them. */
 struct loop *loop_create(struct server *server, int wake_fd);
 /* For background_init, before loop_run. */
 uv_loop_t *loop_uv(struct loop *loop);

@@ -61,7 +61,7 @@ static enum lp_code daemon_start(struct daemon *d, struct lp_error *err)
     d->loop = loop_create(server, d->wake_fd);
     if (d->wake_fd < 0 || !server->records || !server->queue || !d->loop)
         return lp_fail(err, LP_NO_MEMORY, "start", "no memory or descriptors to start with");
-    background_init(&d->background, loop_uv(d->loop), server->results);
+    background_init(&d->background, loop_uv(d->loop), server->results, d->wake_fd);
     struct http_params params = {.listen_fd = d->listen_fd,
                                  .own = &d->address,
                                  .connection_limit = d->config.connection_limit,

@@ -7,15 +7,48 @@
 #include <stdlib.h>
 #include <unistd.h>
 
+/* Jobs of one priority, by arrival: in and out in constant time, so that the mutex is held
+ * shortly however many wait. */
+struct job_list {
+    struct job *first, *last;
+};
+
+static void list_append(struct job_list *list, struct job *job)
+{
+    job->next = NULL;
+    job->previous = list->last;
+    if (list->last)
+        list->last->next = job;
+    else
+        list->first = job;
+    list->last = job;
+    job->list = list;
+}
+
+static void list_remove(struct job *job)
+{
+    struct job_list *list = job->list;
+    if (job->previous)
+        job->previous->next = job->next;
+    else
+        list->first = job->next;
+    if (job->next)
+        job->next->previous = job->previous;
+    else
+        list->last = job->previous;
+    job->next = job->previous = NULL;
+    job->list = NULL;
+}
+
 struct queue {
     uint32_t waiting_limit;
     int wake_fd;
     pthread_mutex_t mutex;
     pthread_cond_t work;
-    struct job *jobs;           /* guarded by mutex: by priority, then arrival */
+    struct job_list jobs[QUEUE_PRIORITIES]; /* guarded by mutex */
+    struct job_list given_up;   /* guarded by mutex: cancelled, begun, without helpers */
     struct job *finished;       /* guarded by mutex */
     struct job **finished_tail; /* guarded by mutex */
-    uint64_t arrivals;          /* guarded by mutex */
     uint32_t waiting, running;  /* guarded by mutex */
     uint32_t busy;              /* guarded by mutex: workers between begin and end or finish */
     bool stopping;              /* guarded by mutex */
@@ -36,18 +69,23 @@ struct queue *queue_create(uint32_t waiting_limit, int wake_fd)
     return queue;
 }
 
+static void jobs_destroy(struct job *jobs)
+{
+    for (struct job *job = jobs, *next; job; job = next) {
+        next = job->next;
+        job_destroy(&job);
+    }
+}
+
 void queue_destroy(struct queue **pointer)
 {
     struct queue *queue = *pointer;
     if (!queue)
         return;
-    struct job *lists[] = {queue->jobs, queue->finished};
-    for (size_t i = 0; i < 2; i++) {
-        for (struct job *job = lists[i], *next; job; job = next) {
-            next = job->next;
-            job_destroy(&job);
-        }
-    }
+    for (size_t i = 0; i < QUEUE_PRIORITIES; i++)
+        jobs_destroy(queue->jobs[i].first);
+    jobs_destroy(queue->given_up.first);
+    jobs_destroy(queue->finished);
     pthread_cond_destroy(&queue->work);
     pthread_mutex_destroy(&queue->mutex);
     free(queue);
@@ -59,15 +97,6 @@ static void queue_wake_loop(const struct queue *queue)
     uint64_t one = 1;
     /* Only a counter at its maximum could refuse this, and that one wakes as well. */
     (void)!write(queue->wake_fd, &one, sizeof one);
-}
-
-/* Takes a job out of `jobs`. With the mutex held. */
-static void job_unlink(struct queue *queue, const struct job *job)
-{
-    struct job **at = &queue->jobs;
-    while (*at != job)
-        at = &(*at)->next;
-    *at = job->next;
 }
 
 /* Gives a job back to the loop. With the mutex held. */
@@ -93,13 +122,10 @@ bool queue_push(struct queue *queue, struct job *job)
     pthread_mutex_lock(&queue->mutex);
     bool room = queue->waiting < queue->waiting_limit && !queue->stopping;
     if (room) {
-        struct job **at = &queue->jobs;
-        while (*at && (*at)->request.priority <= job->request.priority)
-            at = &(*at)->next;
+        uint32_t priority = job->request.priority;
         job->phase = JOB_WAITING;
-        job->arrival = queue->arrivals++;
-        job->next = *at;
-        *at = job;
+        list_append(&queue->jobs[priority < QUEUE_PRIORITIES ? priority : QUEUE_PRIORITIES - 1],
+                    job);
         queue->waiting++;
         atomic_fetch_add(&queue->epoch, 1);
         pthread_cond_broadcast(&queue->work);
@@ -112,13 +138,17 @@ bool queue_push(struct queue *queue, struct job *job)
 static bool job_cancel(struct queue *queue, struct job *job)
 {
     atomic_store(&job->cancelled, true);
-    bool in_jobs = false;
-    for (const struct job *at = queue->jobs; at && !in_jobs; at = at->next)
-        in_jobs = at == job;
-    /* With helpers, or finishing: whoever holds it sees the flag and hands it back. */
-    if (!in_jobs || job->helpers > 0)
+    /* With helpers, finishing, or given up before: whoever holds it sees the flag and hands it
+     * back. */
+    if (!job->list || job->list == &queue->given_up || job->helpers > 0)
         return false;
-    job_unlink(queue, job);
+    list_remove(job);
+    if (job->phase == JOB_RUNNING) { /* its film is touched: unmapping it is a worker's work */
+        list_append(&queue->given_up, job);
+        atomic_fetch_add(&queue->epoch, 1);
+        pthread_cond_signal(&queue->work);
+        return false;
+    }
     job->outcome = JOB_CANCELLED;
     job_hand_back(queue, job);
     return true;
@@ -160,15 +190,28 @@ void queue_stop(struct queue *queue)
     pthread_mutex_unlock(&queue->mutex);
 }
 
+/* What a worker should turn to: freeing memory first, then tiles. With the mutex held. */
+static struct job *job_to_help(struct queue *queue)
+{
+    struct job *job = queue->given_up.first;
+    if (job) {
+        list_remove(job);
+        return job;
+    }
+    for (size_t i = 0; i < QUEUE_PRIORITIES; i++)
+        for (job = queue->jobs[i].first; job; job = job->next)
+            if (job_has_tiles(job))
+                return job;
+    return NULL;
+}
+
 struct job *queue_begin(struct queue *queue, unsigned *epoch)
 {
     struct job *job = NULL;
     pthread_mutex_lock(&queue->mutex);
     while (!queue->stopping) {
         *epoch = atomic_load(&queue->epoch);
-        for (job = queue->jobs; job && !job_has_tiles(job);)
-            job = job->next;
-        if (job)
+        if ((job = job_to_help(queue)))
             break;
         pthread_cond_wait(&queue->work, &queue->mutex);
     }
@@ -198,9 +241,9 @@ bool queue_end(struct queue *queue, struct job *job)
     pthread_mutex_lock(&queue->mutex);
     job->helpers--;
     bool last = job->helpers == 0 && !job_has_tiles(job);
-    if (last)
-        job_unlink(queue, job);
-    else
+    if (last && job->list)
+        list_remove(job);
+    if (!last)
         queue->busy--;
     pthread_mutex_unlock(&queue->mutex);
     return last;

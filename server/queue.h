@@ -1,16 +1,21 @@
 /* The render queue: jobs by priority, then arrival; who may render which tile; what is finished.
  *
  *     WAITING --first worker--> RUNNING --last worker leaves--> finishing --> FINISHED --> loop
- *        '------ cancelled, nobody works on it ------------------------------'
+ *        '------ cancelled before it began ----------------------------------'
  *
  * All workers help on the first job that has unclaimed tiles; a job that comes in with a better
  * place is looked at after the current tile. Invariants, under the mutex:
- *  1. A job is in `jobs`, or held by exactly one finishing worker, or in `finished`, or the loop's.
- *  2. A job without helpers that is in `jobs` has unclaimed tiles and is not cancelled. */
+ *  1. A job is in `jobs`, or in `given_up`, or held by exactly one finishing worker, or in
+ *     `finished`, or the loop's.
+ *  2. A job without helpers that is in `jobs` has unclaimed tiles and is not cancelled.
+ *  3. A job in `given_up` was begun, then cancelled while nobody helped on it: the next worker
+ *     finishes it, because its memory may be large and the loop must not wait for that. */
 #ifndef QUEUE_H
 #define QUEUE_H
 
 #include "server/job.h"
+
+#define QUEUE_PRIORITIES 10 /* 0 is the most urgent */
 
 struct queue; /* owns its jobs; thread-safe */
 

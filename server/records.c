@@ -9,8 +9,7 @@
 #include <string.h>
 #include <sys/random.h>
 
-#define RECORDS_BUCKETS    16384 /* a power of two; numbers run on, so they spread evenly */
-#define RECORDS_EXPIRE_MAX 256   /* a call: keeps the loop quick */
+#define RECORDS_BUCKETS 16384 /* a power of two; numbers run on, so they spread evenly */
 
 struct records {
     struct results *results;

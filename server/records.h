@@ -10,7 +10,8 @@
 
 struct queue;
 
-#define RECORDS_MAX 262144 /* finished and live together */
+#define RECORDS_MAX        262144 /* finished and live together */
+#define RECORDS_EXPIRE_MAX 256    /* dropped at a time: keeps the loop quick */
 
 struct record {
     struct record *bucket_next;
@@ -46,7 +47,7 @@ enum record_verdict { RECORD_FOUND, RECORD_EXPIRED, RECORD_UNKNOWN };
 enum record_verdict records_find(struct records *records, const char *id, struct record **out);
 
 /* Drops finished records that are past the retention. Returns whether files became free to be
- * swept. At most a bounded number a call. */
+ * swept. At most RECORDS_EXPIRE_MAX a call. */
 bool records_expire(struct records *records, uint64_t now_ns);
 /* Drops the oldest finished record that has been readable for the least time the contract asks
  * for. False: there is none. */

@@ -18,7 +18,8 @@
 enum file_state { FILE_WRITING, FILE_THERE, FILE_DOOMED, FILE_UNLINKING };
 
 struct result_file {
-    struct result_file *next; /* of its bucket */
+    struct result_file *next;                          /* of its bucket */
+    struct result_file *doomed_next, *doomed_previous; /* DOOMED */
     char key[RESULTS_KEY_BYTES];
     enum file_state state;
     uint32_t refs;
@@ -31,8 +32,10 @@ struct results {
     pthread_mutex_t mutex;
     pthread_cond_t settled;                       /* a file left WRITING or UNLINKING */
     struct result_file *buckets[RESULTS_BUCKETS]; /* guarded by mutex, the files too */
-    uint64_t files, used_bytes, reserved_bytes;   /* guarded by mutex */
-    uint64_t doomed;                              /* guarded by mutex: files in DOOMED */
+    struct result_file *doomed;                   /* guarded by mutex: files in DOOMED */
+    uint64_t unlinking;                           /* guarded by mutex: files in UNLINKING */
+    uint64_t files, used_bytes, reserved_bytes;   /* guarded by mutex: all files there are */
+    uint64_t free_bytes; /* guarded by mutex: of them, those in DOOMED and UNLINKING */
 };
 
 /* Keys begin with a hash, so their first characters spread well. */
@@ -59,9 +62,48 @@ static void file_forget(struct results *results, struct result_file *file)
         at = &(*at)->next;
     *at = file->next;
     results->files--;
-    if (file->state != FILE_UNLINKING) /* that one was taken off when it was doomed */
-        results->used_bytes -= file->bytes;
+    results->used_bytes -= file->bytes;
+    if (file->state == FILE_UNLINKING) {
+        results->unlinking--;
+        results->free_bytes -= file->bytes;
+    }
     free(file);
+}
+
+static void file_doom(struct results *results, struct result_file *file)
+{
+    file->state = FILE_DOOMED;
+    file->doomed_previous = NULL;
+    file->doomed_next = results->doomed;
+    if (file->doomed_next)
+        file->doomed_next->doomed_previous = file;
+    results->doomed = file;
+    results->free_bytes += file->bytes; /* room for others from now on: they unlink it first */
+}
+
+/* Out of the list of doomed files, to be used again or unlinked. */
+static void file_undoom(struct results *results, struct result_file *file)
+{
+    if (file->doomed_previous)
+        file->doomed_previous->doomed_next = file->doomed_next;
+    else
+        results->doomed = file->doomed_next;
+    if (file->doomed_next)
+        file->doomed_next->doomed_previous = file->doomed_previous;
+}
+
+/* Unlinks one doomed file. Called and left with the mutex held, without it in between. */
+static void doomed_unlink(struct results *results)
+{
+    struct result_file *file = results->doomed;
+    file_undoom(results, file);
+    file->state = FILE_UNLINKING;
+    results->unlinking++;
+    pthread_mutex_unlock(&results->mutex);
+    (void)unlinkat(results->folder_fd, file->key, 0);
+    pthread_mutex_lock(&results->mutex);
+    file_forget(results, file);
+    pthread_cond_broadcast(&results->settled);
 }
 
 static enum lp_code folder_clear(int folder_fd, struct lp_error *err)
@@ -123,7 +165,7 @@ void results_destroy(struct results **pointer)
 bool results_reserve(struct results *results, uint64_t bytes)
 {
     pthread_mutex_lock(&results->mutex);
-    uint64_t taken = results->used_bytes + results->reserved_bytes;
+    uint64_t taken = results->used_bytes - results->free_bytes + results->reserved_bytes;
     bool fits = taken <= results->limit_bytes && bytes <= results->limit_bytes - taken;
     if (fits)
         results->reserved_bytes += bytes;
@@ -138,21 +180,40 @@ void results_settle(struct results *results, uint64_t bytes)
     pthread_mutex_unlock(&results->mutex);
 }
 
+/* Whether a file of `bytes` would bring the folder over its limit, with files in it that are on
+ * their way out. */
+static bool must_unlink(const struct results *results, uint64_t bytes)
+{
+    uint64_t left =
+        results->used_bytes < results->limit_bytes ? results->limit_bytes - results->used_bytes : 0;
+    return bytes > left && (results->doomed || results->unlinking > 0);
+}
+
 /* Finds the file to refer to, or makes a new one in WRITING and sets `*fresh`; waits while another
- * thread writes or unlinks it. NULL: no memory. Called and left with the mutex held. */
+ * thread writes or unlinks it, and unlinks doomed files that stand in the way of the limit.
+ * NULL: no memory. Called and left with the mutex held. */
 static struct result_file *file_claim(struct results *results, const char *key, size_t bytes,
                                       bool *fresh)
 {
     struct result_file *file;
-    while ((file = file_find(results, key)) &&
-           (file->state == FILE_WRITING || file->state == FILE_UNLINKING))
-        pthread_cond_wait(&results->settled, &results->mutex);
+    uint64_t rounded =
+        ((uint64_t)bytes + RESULTS_BLOCK_BYTES - 1) & ~(uint64_t)(RESULTS_BLOCK_BYTES - 1);
+    for (;;) {
+        file = file_find(results, key);
+        bool busy = file && (file->state == FILE_WRITING || file->state == FILE_UNLINKING);
+        if (!busy && (file || !must_unlink(results, rounded)))
+            break;
+        if (!busy && results->doomed)
+            doomed_unlink(results);
+        else
+            pthread_cond_wait(&results->settled, &results->mutex);
+    }
     *fresh = !file;
     if (file) {
         if (file->state == FILE_DOOMED) {
+            file_undoom(results, file);
             file->state = FILE_THERE;
-            results->doomed--;
-            results->used_bytes += file->bytes;
+            results->free_bytes -= file->bytes;
         }
         file->refs++;
         return file;
@@ -163,8 +224,7 @@ static struct result_file *file_claim(struct results *results, const char *key, 
     memcpy(file->key, key, strlen(key) + 1);
     file->state = FILE_WRITING;
     file->refs = 1;
-    file->bytes =
-        ((uint64_t)bytes + RESULTS_BLOCK_BYTES - 1) & ~(uint64_t)(RESULTS_BLOCK_BYTES - 1);
+    file->bytes = rounded;
     struct result_file **bucket = bucket_of(results, key);
     file->next = *bucket;
     *bucket = file;
@@ -205,43 +265,18 @@ bool results_drop(struct results *results, const char *key)
 {
     pthread_mutex_lock(&results->mutex);
     struct result_file *file = file_find(results, key);
-    if (file && file->refs > 0 && --file->refs == 0) {
-        file->state = FILE_DOOMED;
-        results->doomed++;
-        results->used_bytes -= file->bytes; /* room for others from now on */
-    }
-    bool doomed = results->doomed > 0;
+    if (file && file->refs > 0 && --file->refs == 0)
+        file_doom(results, file);
+    bool doomed = results->doomed != NULL;
     pthread_mutex_unlock(&results->mutex);
     return doomed;
 }
 
-/* The first doomed file from bucket `*at` on, marked UNLINKING. With the mutex held. */
-static struct result_file *file_next_doomed(struct results *results, size_t *at)
-{
-    for (; *at < RESULTS_BUCKETS && results->doomed > 0; (*at)++) {
-        struct result_file *file = results->buckets[*at];
-        while (file && file->state != FILE_DOOMED)
-            file = file->next;
-        if (!file)
-            continue;
-        file->state = FILE_UNLINKING;
-        results->doomed--;
-        return file;
-    }
-    return NULL;
-}
-
 void results_sweep(struct results *results)
 {
-    size_t at = 0;
     pthread_mutex_lock(&results->mutex);
-    for (struct result_file *file; (file = file_next_doomed(results, &at));) {
-        pthread_mutex_unlock(&results->mutex);
-        (void)unlinkat(results->folder_fd, file->key, 0);
-        pthread_mutex_lock(&results->mutex);
-        file_forget(results, file);
-        pthread_cond_broadcast(&results->settled);
-    }
+    while (results->doomed)
+        doomed_unlink(results);
     pthread_mutex_unlock(&results->mutex);
 }
 

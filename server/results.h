@@ -3,8 +3,9 @@
  *     DIR/results/<sha256>.<png|exr|json>
  *
  * A file exists while somebody refers to it. Space is reserved before a job is accepted and
- * settled when its files are written (in between they count twice, never not at all), so the
- * files never take more than the limit. A file's states:
+ * settled when its files are written (in between they count twice, never not at all). Doomed files
+ * do not count against a reservation, but one that stands in the way of the limit is unlinked
+ * before the next file is written: the files never take more than the limit. A file's states:
  *
  *     (absent) --put--> WRITING --ok--> THERE --last release--> DOOMED --sweep--> UNLINKING -->
  * (absent)
@@ -49,7 +50,8 @@ void results_sweep(struct results *results);
 int results_open(const struct results *results, const char *key, uint64_t *bytes);
 
 struct results_usage {
-    uint64_t files, used_bytes, reserved_bytes, limit_bytes;
+    uint64_t files, used_bytes; /* on the disk, doomed ones too */
+    uint64_t reserved_bytes, limit_bytes;
 };
 struct results_usage results_usage(struct results *results);
 

@@ -16,6 +16,7 @@
 #include <unistd.h>
 
 #define COPY_BLOCK_BYTES   (1u << 20)
+#define CHANGED_TEXT       "the file changed while it was read"
 #define VERIFIED_NAME      "verified"
 #define VERIFIED_BYTES_MAX (1u << 20)
 #define VERIFIED_HEAD      "lightprobe verified 1\n"
@@ -48,6 +49,15 @@ static struct scene_identity identity_of(const struct stat *about)
         .mtime_ns = (int64_t)about->st_mtim.tv_sec * 1000000000 + about->st_mtim.tv_nsec,
         .ctime_ns = (int64_t)about->st_ctim.tv_sec * 1000000000 + about->st_ctim.tv_nsec,
     };
+}
+
+bool scene_identity_of(struct scene_identity *out, int fd)
+{
+    struct stat about;
+    if (fstat(fd, &about) < 0)
+        return false;
+    *out = identity_of(&about);
+    return true;
 }
 
 static void key_of(char out[SCENE_KEY_BYTES], const char *sha256)
@@ -232,10 +242,11 @@ static enum lp_code block_write(int fd, const unsigned char *block, size_t bytes
     return LP_OK;
 }
 
-/* Copies `from` to `to` (or lets them share their blocks, where the file system can) and hashes
- * the very bytes of the copy. */
-static enum lp_code copy_and_hash(const struct scene_store *store, int to, int from, char *sha256,
-                                  struct lp_error *err)
+/* Copies `bytes` of `from` to `to` (or lets them share their blocks, where the file system can) and
+ * hashes the very bytes of the copy. Not one byte more is taken: a file that grows while it is read
+ * must not fill the disk. */
+static enum lp_code copy_and_hash(const struct scene_store *store, int to, int from, uint64_t bytes,
+                                  char *sha256, struct lp_error *err)
 {
     uint8_t raw[LP_SHA256_BYTES];
     struct lp_sha256_state hash;
@@ -245,14 +256,18 @@ static enum lp_code copy_and_hash(const struct scene_store *store, int to, int f
         return lp_fail(err, LP_NO_MEMORY, "resident", "no memory to copy the scene");
     bool shared = ioctl(to, FICLONE, from) == 0;
     lp_sha256_begin(&hash);
-    for (off_t at = 0; !code;) {
-        ssize_t n = pread(shared ? to : from, block, COPY_BLOCK_BYTES, at);
+    for (uint64_t at = 0; !code;) {
+        ssize_t n = pread(shared ? to : from, block, COPY_BLOCK_BYTES, (off_t)at);
         if (n < 0 && errno == EINTR)
             continue;
         if (n < 0)
             code = data_fail_errno(err, "scenes", "the file cannot be read", errno);
         if (n <= 0)
             break;
+        if ((uint64_t)n > bytes - at) {
+            code = lp_fail(err, LP_CORRUPT, "scenes", CHANGED_TEXT);
+            break;
+        }
         if (atomic_load(store->stop)) {
             code = lp_fail(err, LP_CANCELLED, "scenes", "the service is shutting down");
             break;
@@ -260,7 +275,7 @@ static enum lp_code copy_and_hash(const struct scene_store *store, int to, int f
         lp_sha256_update(&hash, block, (size_t)n);
         if (!shared)
             code = block_write(to, block, (size_t)n, err);
-        at += n;
+        at += (uint64_t)n;
     }
     free(block);
     lp_sha256_end(&hash, raw);
@@ -316,7 +331,7 @@ enum lp_code scene_store_adopt(struct scene_store *store, struct lp_scene_file *
     int fd = openat(folder, temp, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
     if (fd < 0)
         return data_fail_errno(err, "resident", "the checked copy cannot be created", errno);
-    enum lp_code code = copy_and_hash(store, fd, source_fd, verified.sha256, err);
+    enum lp_code code = copy_and_hash(store, fd, source_fd, identity->bytes, verified.sha256, err);
     if (code)
         goto out;
     if (fstat(source_fd, &about) < 0) {
@@ -325,7 +340,7 @@ enum lp_code scene_store_adopt(struct scene_store *store, struct lp_scene_file *
     }
     struct scene_identity after = identity_of(&about);
     if (!scene_identity_equal(&after, identity)) {
-        code = lp_fail(err, LP_CORRUPT, "scenes", "the file changed while it was read");
+        code = lp_fail(err, LP_CORRUPT, "scenes", CHANGED_TEXT);
         goto out;
     }
     code = copy_open(store, &file, temp, LP_TRUST_NOTHING, err);

@@ -25,6 +25,8 @@ struct scene_identity {
     uint64_t dev, ino, bytes;
     int64_t mtime_ns, ctime_ns;
 };
+/* That of an open file; false: it cannot be asked. */
+bool scene_identity_of(struct scene_identity *out, int fd);
 bool scene_identity_equal(const struct scene_identity *a, const struct scene_identity *b);
 
 struct scene_store;

@@ -16,10 +16,16 @@
 /* ---- life --------------------------------------------------------------------------------------
  */
 
+static void entry_free(struct scene_entry *entry)
+{
+    free(entry->text);
+    free(entry);
+}
+
 static void scenes_free(struct scenes *scenes)
 {
     for (size_t i = 0; i < scenes->count; i++)
-        free(scenes->entries[i]);
+        entry_free(scenes->entries[i]);
     for (struct scene *scene = scenes->residents, *next; scene; scene = next) {
         next = scene->next;
         lp_scene_file_close(&scene->file);
@@ -94,6 +100,65 @@ bool scenes_scanned(const struct scenes *scenes)
     return atomic_load(&scenes->scanned);
 }
 
+/* ---- documents ---------------------------------------------------------------------------------
+ */
+
+/* What an entry shows, as text with `refs` 0. Made here, beside the loop, and once per change:
+ * writing a thousand of them takes 10 ms. By the thread that writes the entry, or with the mutex
+ * held. NULL: no memory. */
+static char *entry_document(const struct scene_entry *entry)
+{
+    struct wire_scene shown = {.state = entry->state, .open_s = -1};
+    if (entry->scene) {
+        shown = entry->scene->about.scene;
+        shown.refs = 0;
+    }
+    memcpy(shown.reason, entry->reason, sizeof shown.reason);
+    memcpy(shown.name, entry->name, sizeof shown.name);
+    return wire_scene_write(&shown);
+}
+
+/* Makes the document of a changed entry. Scenes thread, without the mutex. */
+static void entry_changed(struct scenes *scenes, struct scene_entry *entry)
+{
+    char *text = entry_document(entry);
+    pthread_mutex_lock(&scenes->mutex);
+    char *old = entry->text;
+    entry->text = text;
+    pthread_mutex_unlock(&scenes->mutex);
+    free(old);
+}
+
+/* A growing text of known room. */
+struct text {
+    char *at;
+};
+
+static void text_add(struct text *text, const char *from, size_t bytes)
+{
+    memcpy(text->at, from, bytes);
+    text->at += bytes;
+}
+
+#define REFS_MARK       "\"refs\":" /* nowhere else: in a JSON string its quotes are escaped */
+#define REFS_MORE_BYTES 20          /* digits of the largest number */
+
+/* An entry's document with the count of now. With the mutex held. */
+static void entry_copy(struct text *text, const struct scene_entry *entry)
+{
+    const char *rest = entry->text;
+    const char *mark = entry->scene ? strstr(rest, REFS_MARK) : NULL;
+    if (mark) {
+        const char *digit = mark + strlen(REFS_MARK);
+        char count[REFS_MORE_BYTES + 1];
+        int n = snprintf(count, sizeof count, "%" PRIu64, entry->scene->refs);
+        text_add(text, rest, (size_t)(digit - rest));
+        text_add(text, count, n > 0 ? (size_t)n : 0);
+        rest = digit + 1; /* behind the 0 */
+    }
+    text_add(text, rest, strlen(rest));
+}
+
 /* ---- names -------------------------------------------------------------------------------------
  */
 
@@ -139,6 +204,7 @@ struct scene_entry *scenes_entry_add(struct scenes *scenes, const char *name)
         return NULL;
     memcpy(entry->name, name, strlen(name) + 1);
     entry->state = WIRE_SCENE_LOADING;
+    entry->text = entry_document(entry);
     pthread_mutex_lock(&scenes->mutex);
     bool there, full = scenes->count == SCENES_MAX;
     size_t at = entry_place(scenes, name, &there);
@@ -150,7 +216,7 @@ struct scene_entry *scenes_entry_add(struct scenes *scenes, const char *name)
     }
     pthread_mutex_unlock(&scenes->mutex);
     if (full) {
-        free(entry);
+        entry_free(entry);
         return NULL;
     }
     return entry;
@@ -167,7 +233,7 @@ void scenes_entry_remove(struct scenes *scenes, struct scene_entry *entry)
             (scenes->count - at - 1) * sizeof scenes->entries[0]);
     scenes->count--;
     pthread_mutex_unlock(&scenes->mutex);
-    free(entry);
+    entry_free(entry);
 }
 
 void scenes_names(struct scenes *scenes, char *out, size_t room)
@@ -191,6 +257,13 @@ void scenes_names(struct scenes *scenes, char *out, size_t room)
 /* ---- publishing --------------------------------------------------------------------------------
  */
 
+/* Its document says what is not so any more. With the mutex held. */
+static void entry_forget_text(struct scene_entry *entry)
+{
+    free(entry->text);
+    entry->text = NULL;
+}
+
 /* With the mutex held. */
 static void entry_show(struct scene_entry *entry, struct scene *scene)
 {
@@ -200,6 +273,7 @@ static void entry_show(struct scene_entry *entry, struct scene *scene)
     entry->scene = scene;
     entry->state = WIRE_SCENE_READY;
     entry->reason[0] = 0;
+    entry_forget_text(entry);
 }
 
 /* With the mutex held. */
@@ -218,6 +292,8 @@ bool scenes_publish_resident(struct scenes *scenes, struct scene_entry *entry, c
     if (scene)
         entry_show(entry, scene);
     pthread_mutex_unlock(&scenes->mutex);
+    if (scene)
+        entry_changed(scenes, entry);
     return scene != NULL;
 }
 
@@ -243,6 +319,7 @@ bool scenes_publish(struct scenes *scenes, struct scene_entry *entry, struct lp_
     scenes->residents = scene;
     entry_show(entry, scene);
     pthread_mutex_unlock(&scenes->mutex);
+    entry_changed(scenes, entry);
     return true;
 }
 
@@ -254,7 +331,19 @@ void scenes_fail(struct scenes *scenes, struct scene_entry *entry, const char *r
     entry->scene = NULL;
     entry->state = WIRE_SCENE_FAILED;
     snprintf(entry->reason, sizeof entry->reason, "%s", reason);
+    entry_forget_text(entry);
     pthread_mutex_unlock(&scenes->mutex);
+    entry_changed(scenes, entry);
+}
+
+void scenes_delay(struct scenes *scenes, struct scene_entry *entry, const char *reason)
+{
+    pthread_mutex_lock(&scenes->mutex);
+    entry->state = entry->scene ? WIRE_SCENE_READY : WIRE_SCENE_LOADING;
+    snprintf(entry->reason, sizeof entry->reason, "%s", reason);
+    entry_forget_text(entry);
+    pthread_mutex_unlock(&scenes->mutex);
+    entry_changed(scenes, entry);
 }
 
 bool scenes_collect(struct scenes *scenes)
@@ -346,7 +435,9 @@ enum wire_problem_code scenes_acquire(struct scenes *scenes, struct scene **out,
         return wire_problem_set(problem, WIRE_PROBLEM_SCENE_FAILED, "scene \"%s\": %s", name,
                                 reason);
     return wire_problem_set(problem, WIRE_PROBLEM_SCENE_NOT_READY,
-                            "scene \"%s\" is being verified; try again soon", name);
+                            reason[0] ? "scene \"%s\" cannot be opened yet and is tried again: %s"
+                                      : "scene \"%s\" is being verified; try again soon%s",
+                            name, reason);
 }
 
 void scenes_release(struct scenes *scenes, struct scene **pointer)
@@ -362,50 +453,54 @@ void scenes_release(struct scenes *scenes, struct scene **pointer)
         scenes_nudge(scenes); /* unmapping a large scene takes time: not on this thread */
 }
 
-/* With the mutex held; `*held` gets a reference, so that the channels stay. */
-static void entry_describe(struct wire_scene *out, struct scene **held, struct scene_entry *entry)
+/* The room for the documents of `count` entries, making those that are missing (memory ran out
+ * when they changed, or it is just now being done); 0: no memory. With the mutex held. */
+static size_t entries_room(struct scene_entry **entries, size_t count)
 {
-    *held = entry->scene;
-    if (entry->scene) {
-        *out = entry->scene->about.scene;
-        out->refs = entry->scene->refs;
-        entry->scene->refs++;
-    } else {
-        *out = (struct wire_scene){.state = entry->state, .open_s = -1};
-        memcpy(out->reason, entry->reason, sizeof out->reason);
+    size_t room = 1;
+    for (size_t i = 0; i < count; i++) {
+        if (!entries[i]->text)
+            entries[i]->text = entry_document(entries[i]);
+        if (!entries[i]->text)
+            return 0;
+        room += strlen(entries[i]->text) + REFS_MORE_BYTES + 1; /* and a comma */
     }
-    memcpy(out->name, entry->name, sizeof out->name);
+    return room;
 }
 
 enum wire_problem_code scenes_write(struct scenes *scenes, char **text,
                                     struct wire_problem *problem, const char *name)
 {
+    static const char head[] = "{\"scenes\":[", tail[] = "]}";
     *text = NULL;
-    struct wire_scene *list = NULL;
-    struct scene **held = NULL;
-    size_t count = 0;
     pthread_mutex_lock(&scenes->mutex);
     struct scene_entry *one = name ? entry_find(scenes, name) : NULL;
-    size_t room = name ? 1 : scenes->count;
-    list = calloc(room ? room : 1, sizeof *list);
-    held = calloc(room ? room : 1, sizeof *held);
-    if (list && held && (one || !name)) {
-        for (; count < room; count++)
-            entry_describe(&list[count], &held[count], name ? one : scenes->entries[count]);
+    struct scene_entry **entries = name ? &one : scenes->entries;
+    size_t count = name ? one != NULL : scenes->count;
+    size_t room = entries_room(entries, count);
+    *text = room ? malloc(room + sizeof head + sizeof tail) : NULL;
+    if (*text && (one || !name)) {
+        struct text out = {*text};
+        if (!name)
+            text_add(&out, head, strlen(head));
+        for (size_t i = 0; i < count; i++) {
+            if (i > 0)
+                text_add(&out, ",", 1);
+            entry_copy(&out, entries[i]);
+        }
+        if (!name)
+            text_add(&out, tail, strlen(tail));
+        text_add(&out, "", 1);
     }
     pthread_mutex_unlock(&scenes->mutex);
-    enum wire_problem_code code = WIRE_PROBLEM_NONE;
-    if (!list || !held)
-        code = wire_problem_set(problem, WIRE_PROBLEM_INTERNAL, "no memory for the list of scenes");
-    else if (name && !one)
-        code = unknown(scenes, problem, name);
-    else
-        *text = name ? wire_scene_write(list) : wire_scenes_write(list, count);
-    for (size_t i = 0; held && i < count; i++)
-        scenes_release(scenes, &held[i]);
-    free(held);
-    free(list);
-    return code;
+    if (!*text)
+        return wire_problem_set(problem, WIRE_PROBLEM_INTERNAL, "no memory for the list of scenes");
+    if (name && !one) {
+        free(*text);
+        *text = NULL;
+        return unknown(scenes, problem, name);
+    }
+    return WIRE_PROBLEM_NONE;
 }
 
 struct scenes_totals scenes_totals(struct scenes *scenes)

@@ -2,8 +2,10 @@
  *
  * A thread of its own (lp-scenes) looks at DIR/scenes when it changes and every two seconds,
  * verifies what is new and publishes it; the loop acquires and releases. A file that is replaced
- * keeps serving its old scene until the new one is verified; jobs keep the scene they began with.
- */
+ * keeps serving its old scene until the new one is verified, or found to be bad: then the name is
+ * "failed". A passing fault (disk full, no memory, no descriptor) is no verdict on the file: the
+ * old scene goes on, a new name stays "loading", both show the reason, and it is tried again. Jobs
+ * keep the scene they began with. */
 #ifndef SCENES_H
 #define SCENES_H
 

@@ -16,6 +16,7 @@ struct scene_entry {
     enum wire_scene_state state;
     char reason[512];
     struct scene *scene; /* READY */
+    char *text;          /* owned: its document, refs 0; NULL: to be made */
 
     /* Scenes thread only. */
     bool seen_now;              /* in this scan */
@@ -56,7 +57,10 @@ bool scenes_publish(struct scenes *scenes, struct scene_entry *entry, struct lp_
                     const char *sha256, double open_s);
 /* Points `name` at a scene that is resident already; false where it is not. */
 bool scenes_publish_resident(struct scenes *scenes, struct scene_entry *entry, const char *sha256);
+/* The file is bad: no scene is shown any more. */
 void scenes_fail(struct scenes *scenes, struct scene_entry *entry, const char *reason);
+/* The file cannot be taken in just now: what was shown stays, with the reason. */
+void scenes_delay(struct scenes *scenes, struct scene_entry *entry, const char *reason);
 /* Unmaps scenes without names and jobs; true if there were some. */
 bool scenes_collect(struct scenes *scenes);
 /* The hashes of all residents; `*out` is the caller's. Returns the count; SIZE_MAX: no memory. */

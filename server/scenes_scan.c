@@ -108,13 +108,17 @@ static bool is_transient(enum lp_code code)
     return code == LP_IO || code == LP_NO_SPACE || code == LP_NO_MEMORY;
 }
 
-/* Whether the file was written so recently that its writer may not have finished. */
-static bool is_young(const struct scene_identity *identity)
+/* Whether the file behind `fd` was written so recently that its writer may not have finished, or
+ * since it had `identity`: reading it may have taken long. */
+static bool is_young(int fd, const struct scene_identity *identity)
 {
     struct timespec now;
+    struct scene_identity after;
+    if (!scene_identity_of(&after, fd))
+        return false;
     clock_gettime(CLOCK_REALTIME, &now);
-    int64_t age_ns = (int64_t)now.tv_sec * 1000000000 + now.tv_nsec - identity->ctime_ns;
-    return age_ns >= 0 && age_ns < (int64_t)SETTLE_NS;
+    int64_t age_ns = (int64_t)now.tv_sec * 1000000000 + now.tv_nsec - after.ctime_ns;
+    return !scene_identity_equal(&after, identity) || (age_ns >= 0 && age_ns < (int64_t)SETTLE_NS);
 }
 
 static void entry_failed(struct scenes *scenes, struct scene_entry *entry, enum lp_code code,
@@ -129,13 +133,21 @@ static void entry_failed(struct scenes *scenes, struct scene_entry *entry, enum 
     if (entry->delay_ns > RETRY_LAST_NS)
         entry->delay_ns = RETRY_LAST_NS;
     entry->retry_ns = now + entry->delay_ns;
-    if (young) /* it stays what it was: loading, or the old scene */
+    if (young && !is_transient(code)) /* it stays what it was: loading, or the old scene */
         return;
     char reason[512];
     /* A place inside of the file helps; a path of our own folders does not. */
     bool inside = error->where[0] && !strchr(error->where, '/');
     snprintf(reason, sizeof reason, "scenes/%s%s: %.110s%s%.255s", entry->name, SUFFIX,
              inside ? error->where : "", inside ? ": " : "", error->text);
+    if (is_transient(code)) { /* no verdict on the file */
+        if (strcmp(entry->reason, reason) == 0)
+            return; /* said and shown already */
+        log_event(LOG_WARNING, "scene_delayed", "scene=%s serving=%s reason=%s", entry->name,
+                  entry->scene ? "old" : "nothing", log_quote(reason).text);
+        scenes_delay(scenes, entry, reason);
+        return;
+    }
     log_event(LOG_WARNING, "scene_failed", "scene=%s reason=%s", entry->name,
               log_quote(reason).text);
     scenes_fail(scenes, entry, reason);
@@ -183,7 +195,7 @@ static void entry_look(struct scenes *scenes, struct scene_entry *entry, enum pa
     if (code == LP_NOT_FOUND)
         return; /* the next scan of the names sees it */
     if (code) {
-        /* A link stays a link: said once. An open scene outlives a passing fault. */
+        /* A link stays a link: said once. */
         if (!entry->settled || (entry->scene && !is_transient(code)))
             entry_failed(scenes, entry, code, &error, false);
         return;
@@ -210,7 +222,7 @@ static void entry_look(struct scenes *scenes, struct scene_entry *entry, enum pa
     if (!code)
         entry_ready(scenes, entry, &file, sha256, "verified=now", begin_ns);
     else if (code != LP_CANCELLED)
-        entry_failed(scenes, entry, code, &error, is_young(&identity));
+        entry_failed(scenes, entry, code, &error, is_young(fd, &identity));
 out:
     close(fd);
 }

@@ -36,7 +36,9 @@ ENVIRONMENT = {
     **{k: v for k, v in os.environ.items() if not k.startswith(("LIGHTPROBE_", "ASAN_", "UBSAN_"))},
     "ASAN_OPTIONS": "exitcode=86:abort_on_error=0:detect_leaks=1:strict_string_checks=1",
     "UBSAN_OPTIONS": "halt_on_error=1:print_stacktrace=1:exitcode=86",
-    "TSAN_OPTIONS": "exitcode=86:halt_on_error=0",
+    "TSAN_OPTIONS": ":".join(filter(None, (
+        os.environ.get("TSAN_OPTIONS"), "exitcode=86:halt_on_error=0",
+        "suppressions=%s" % (ROOT / "tests" / "tsan.supp")))),
     "LC_ALL": "C.UTF-8",
 }
 

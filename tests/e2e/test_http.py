@@ -1,10 +1,14 @@
 """Verbs, addresses, Accepts, hosts, lengths and half requests, most of them over a raw socket."""
 
 import json
+import os
+import signal
 import socket
+import statistics
+import time
 import unittest
 
-from harness import Daemon, data_folder, read_response
+from harness import Daemon, data_folder, read_response, wait_until
 from test_bad_input import GOOD, problem
 
 MIB = 1 << 20
@@ -62,9 +66,65 @@ class Addresses(unittest.TestCase):
                 answer = daemon.request("POST", "/v1/render", GOOD, {"Accept": accept})
                 problem(self, answer, 406, ("application/json", "image/png"))
 
+    def test_an_accept_without_a_range_means_anything(self):
+        for accept in ("", " , ", "json"):
+            with self.subTest(accept):
+                answer = daemon.request("POST", "/v1/render", GOOD, {"Accept": accept})
+                self.assertEqual(answer.status, 200, answer.body[:300])
+                self.assertEqual(answer.headers["Content-Type"], "application/json")
+
     def test_problems_echo_the_request_id(self):
         answer = daemon.request("GET", "/v1/nothing", headers={"X-Request-Id": "abc-1"})
         self.assertEqual(problem(self, answer, 404)["request_id"], "abc-1")
+
+
+class Conditions(unittest.TestCase):
+    """If-None-Match, and what a 304 and a HEAD say of a body that they do not carry."""
+
+    def setUp(self):
+        self.document = daemon.render({**GOOD, "images": ["png"]})
+        self.path = self.document["probes"][0]["images"][0]["href"]
+        self.whole = daemon.get(self.path)
+        self.assertEqual(self.whole.status, 200)
+
+    def test_known(self):
+        for path in (self.path, "/v1/jobs/%s/result" % self.document["id"]):
+            whole = daemon.get(path)
+            for verb in ("GET", "HEAD"):
+                for tag in (whole.headers["ETag"], "*", 'W/"x", ' + whole.headers["ETag"]):
+                    with self.subTest(path=path, verb=verb, tag=tag), daemon.connect() as connection:
+                        ask = ("%s %s HTTP/1.1\r\nHost: localhost\r\nIf-None-Match: %s\r\n\r\n"
+                               "GET /v1/nothing HTTP/1.1\r\nHost: localhost\r\nConnection: close"
+                               "\r\n\r\n" % (verb, path, tag))
+                        connection.sendall(ask.encode())
+                        received = b""
+                        while piece := connection.recv(65536):
+                            received += piece
+                        head, rest = received.split(b"\r\n\r\n", 1)
+                        self.assertTrue(head.startswith(b"HTTP/1.1 304 "), head)
+                        # No body: the next answer stands right behind the head.
+                        self.assertTrue(rest.startswith(b"HTTP/1.1 404 "), rest[:100])
+                        lengths = [line.split(b":")[1].strip() for line in head.split(b"\r\n")
+                                   if line.lower().startswith(b"content-length:")]
+                        self.assertIn(lengths, ([], [b"%d" % len(whole.body)]))
+
+    def test_unknown(self):
+        answer = daemon.get(self.path, {"If-None-Match": '"%s"' % ("0" * 64)})
+        self.assertEqual((answer.status, answer.body), (200, self.whole.body))
+
+    def test_head_has_the_length_of_the_get(self):
+        answer = daemon.request("HEAD", self.path)
+        self.assertEqual((answer.status, answer.body), (200, b""))
+        self.assertEqual(int(answer.headers["Content-Length"]), len(self.whole.body))
+
+    def test_a_post_is_done_whatever_is_known(self):
+        for accept in ("image/png", "application/json"):
+            for tag in ("*", self.whole.headers["ETag"]):
+                with self.subTest(accept=accept, tag=tag):
+                    answer = daemon.request("POST", "/v1/render", GOOD, {
+                        "Accept": accept, "If-None-Match": tag, "Range": "bytes=0-3"})
+                    self.assertEqual(answer.status, 200)
+                    self.assertGreater(len(answer.body), 4)
 
 
 class Hosts(unittest.TestCase):
@@ -221,6 +281,83 @@ class HalfRequests(unittest.TestCase):
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
             connection.close()  # a reset
         self.alive()
+
+    def test_leaving_during_an_upload_is_noticed(self):
+        """Also when the last bytes and the end of the stream come together (of many at once: the
+        library accepts few in a turn, and sees these ends by itself)."""
+        def open_now():
+            return daemon.get("/v1/stats").json()["http"]["connections"] - 1
+
+        wait_until(lambda: open_now() == 0, "nobody is connected")
+        began = time.monotonic()
+        daemon.signal(signal.SIGSTOP)
+        os.waitid(os.P_PID, daemon.process.pid, os.WSTOPPED | os.WNOWAIT)
+        try:
+            for end in (b"\r\nX-Half: 1", b"\r\n\r\n", b"\r\n\r\n" + b" " * 30,
+                        b"\r\n\r\n" + b" " * 30000) * 20:
+                with daemon.connect() as connection:
+                    connection.sendall(b"POST /v1/render HTTP/1.1\r\nHost: localhost\r\n"
+                                       b"Content-Length: 1000000" + end)
+        finally:
+            daemon.signal(signal.SIGCONT)
+        wait_until(lambda: open_now() == 0, "all of them are noticed")
+        self.assertLess(time.monotonic() - began, 8)  # the deadlines begin at 10
+
+    def test_a_client_that_never_reads_and_is_answered_early(self):
+        """The library's connection outlives the socket that is read away behind it: what comes
+        afterwards must reach neither. How many answers fill the socket is found by trying."""
+        folder = data_folder()
+        path = str(folder / "socket")
+        lone = Daemon(folder, listen="unix:" + path)
+        wait_until(lambda: lone.out, "it is ready")
+        get = b"GET /v1/nothing HTTP/1.1\r\nHost: localhost\r\n\r\n"
+        post = b"POST /v1/nothing HTTP/1.1\r\nHost: localhost\r\nContent-Length: 100000\r\n\r\n"
+
+        def connect():
+            connection = socket.socket(socket.AF_UNIX)
+            connection.connect(path)
+            return connection
+
+        def refused():
+            with connect() as connection:
+                connection.sendall(b"GET /v1/stats HTTP/1.1\r\nHost: localhost\r\n"
+                                   b"Connection: close\r\n\r\n")
+                return read_response(connection).json()["http"]["requests"]["4xx"]
+
+        with connect() as connection:
+            connection.sendall(get * 500)
+            seen = [-1]
+
+            def full():
+                seen.append(refused())
+                time.sleep(0.1)
+                return seen[-1] == seen[-2]
+
+            wait_until(full, "no more answers fit")
+        clients = [connect() for _ in range(10)]
+        for i, client in enumerate(clients):
+            client.sendall(get * max(0, seen[-1] - 7 + i) + post)
+        time.sleep(3)  # HTTP_LINGER_S, and more
+        for client in clients:
+            try:
+                client.send(b"x" * 100)
+            except OSError:
+                pass
+        time.sleep(0.3)
+        self.assertGreater(refused(), 0)  # it lives
+        for client in clients:
+            client.close()
+        lone.stop()
+
+    def test_a_long_broken_body_is_answered_at_once(self):
+        """It is read beside the loop, which must not need its next tick (100 ms) to go on."""
+        body = b"{" + b" " * 20000
+        times = []
+        for _ in range(10):
+            began = time.perf_counter()
+            problem(self, daemon.request("POST", "/v1/render", body), 400)
+            times.append(time.perf_counter() - began)
+        self.assertLess(statistics.median(times), 0.05, times)
 
     def test_rubbish(self):
         for data in (b"\0" * 100, b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03", b"\r\n" * 50,

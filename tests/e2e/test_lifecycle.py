@@ -7,10 +7,11 @@ import signal
 import socket
 import subprocess
 import threading
+import time
 import unittest
 
 from harness import (ENVIRONMENT, BUILD, LIMIT_S, Daemon, cli_ok, data_folder, scenes,
-                     temporary_folder, wait_until)
+                     read_response, temporary_folder, wait_until)
 
 QUICK = {"scene": "room", "mode": "reference", "face_px": 8, "samples_per_axis": 1,
          "probes": [[0.1, 0.2, 0.3]]}
@@ -329,6 +330,73 @@ class End(unittest.TestCase):
         render.join(LIMIT_S)
         self.assertFalse(render.is_alive())
         self.assertTrue(render.error or render.answer.status == 503)
+
+    def test_two_sigterms_in_a_row(self):
+        """The second may come at any moment of the end, and never is what ends the process."""
+        for i in range(8):
+            with self.subTest(i):
+                if i:
+                    self.daemon = Daemon(self.daemon.folder).ready()
+                self.daemon.signal()
+                time.sleep(0.0005 * i)
+                self.daemon.signal(signal.SIGINT if i % 2 else signal.SIGTERM)
+                self.assertEqual(self.daemon.wait(), 0)
+
+    def test_many_sigterms(self):
+        """Until the process is gone, so that each part of the end gets some."""
+        while self.daemon.process.poll() is None:
+            self.daemon.signal()
+        self.assertEqual(self.daemon.wait(), 0)
+
+    def test_not_ready_after_sigterm(self):
+        """Whoever sees `ready` may send work: after a signal that would be a lie."""
+        self.daemon.stop()
+        for i in range(8):
+            daemon = Daemon(data_folder("room", "sphere", "hills"))
+            wait_until(lambda: (daemon.folder / "results").exists() or daemon.out, "it starts")
+            time.sleep(0.001 * i)
+            daemon.signal()
+            status = daemon.wait()
+            log = daemon.stderr()
+            # Very early the signal ends it as it would any program: nothing was promised yet.
+            self.assertIn(status, (0, -signal.SIGTERM), log)
+            self.assertNotIn("event=ready", log.partition("event=signal")[2])
+
+    def test_the_backlog_is_answered(self):
+        """Connections that the system took in before the signal are answered, not reset."""
+        self.daemon.signal(signal.SIGSTOP)
+        clients = [self.daemon.connect() for _ in range(400)]
+        for client in clients:
+            client.sendall(b"GET /v1/health/live HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        self.daemon.signal()
+        self.daemon.signal(signal.SIGCONT)
+        answers = [read_response(client) for client in clients]
+        for client in clients:
+            client.close()
+        self.assertEqual([a.status if a else None for a in answers], [200] * len(clients))
+        self.assertEqual(self.daemon.wait(), 0)
+
+    def test_ends_amid_bodies_that_become_whole(self):
+        """A request that reaches its handler at the very end must not wait for anything."""
+        head = (b"POST /v1/render HTTP/1.1\r\nHost: localhost\r\nContent-Length: 20000\r\n\r\n{"
+                + b" " * 19998)
+        for lead_s in (0.012, 0.006, 0.003):
+            with self.subTest(lead_s):
+                daemon = Daemon(data_folder("room")).ready()
+                clients = [daemon.connect() for _ in range(300)]
+                for client in clients:
+                    client.sendall(head)
+                daemon.get("/v1/stats")
+                daemon.signal()
+                time.sleep(2 - lead_s)  # LOOP_CLOSE_S
+                for client in clients:
+                    try:
+                        client.send(b"}")
+                    except OSError:
+                        pass  # it has ended already
+                self.assertEqual(daemon.wait(), 0)
+                for client in clients:
+                    client.close()
 
     def test_a_client_that_leaves_cancels_its_work(self):
         body = json.dumps({**QUICK, "face_px": 4096, "samples_per_axis": 16}).encode()

@@ -20,6 +20,15 @@ TEST(no_header_means_the_first_offer)
     CHECK_EQ(choose("*/*", NULL), 0);
 }
 
+TEST(no_readable_range_means_the_first_offer)
+{
+    CHECK_EQ(choose("", NULL), 0);
+    CHECK_EQ(choose(" ,\t, ;q=0", NULL), 0);
+    CHECK_EQ(choose("json", NULL), 0);
+    CHECK_EQ(choose("/, image/, /png", NULL), 0);
+    CHECK_EQ(choose("", "image/png"), 1); /* the other header has one */
+}
+
 TEST(quality_decides)
 {
     CHECK_EQ(choose("image/png", NULL), 1);
@@ -44,7 +53,6 @@ TEST(nothing_acceptable)
     CHECK_EQ(choose("image/png;q=0", NULL), -1);
     CHECK_EQ(choose("image/png;q=0.000", NULL), -1);
     CHECK_EQ(choose("image/pngx, application/jsonx, image", NULL), -1);
-    CHECK_EQ(choose("", NULL), -1);
 }
 
 TEST(rubbish_is_passed_over)
@@ -54,4 +62,5 @@ TEST(rubbish_is_passed_over)
     CHECK_EQ(choose("image/png ; q=1 ; x", NULL), 1);
     CHECK_EQ(choose("image/png;q=2", NULL), -1);
     CHECK_EQ(choose("image/png;q=", NULL), -1);
+    CHECK_EQ(choose("json, text/html", NULL), -1);
 }

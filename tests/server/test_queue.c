@@ -109,6 +109,77 @@ TEST(cancelling_comes_back)
     close(wake_fd);
 }
 
+TEST(a_begun_job_that_is_cancelled_is_freed_by_a_worker)
+{
+    struct small_scene scene;
+    int wake_fd;
+    unsigned epoch;
+    struct queue *queue = make(8, &wake_fd);
+    fixture_scene(&scene);
+    struct job *begun = fixture_job(&scene, 8, 5), *urgent = fixture_job(&scene, 8, 0);
+    REQUIRE(queue_push(queue, begun));
+    CHECK(queue_begin(queue, &epoch) == begun);
+    REQUIRE(queue_push(queue, urgent));
+    CHECK(!queue_end(queue, begun)); /* left for the better one, its film touched */
+    CHECK(queue_begin(queue, &epoch) == urgent);
+    queue_cancel(queue, begun);
+    queue_cancel(queue, begun); /* once more changes nothing */
+    CHECK(!woken(wake_fd));
+    CHECK(queue_take_finished(queue) == NULL);
+    CHECK(queue_is_news(queue, epoch)); /* so that a worker looks soon */
+    CHECK(!queue_end(queue, urgent));
+    CHECK(queue_begin(queue, &epoch) == begun); /* before the better one: it takes memory */
+    CHECK(queue_end(queue, begun));
+    worker_finish(begun, queue, NULL);
+    queue_finish(queue, begun);
+    CHECK(woken(wake_fd));
+    CHECK(queue_take_finished(queue) == begun);
+    CHECK_EQ(begun->outcome, JOB_CANCELLED);
+    CHECK(begun->film_memory == NULL);
+    CHECK(queue_begin(queue, &epoch) == urgent);
+    CHECK(!queue_end(queue, urgent));
+    queue_cancel(queue, urgent); /* nobody comes for it: it goes with the queue */
+    job_destroy(&begun);
+    queue_destroy(&queue);
+    small_scene_finish(&scene);
+    close(wake_fd);
+}
+
+TEST(jobs_leave_from_anywhere_and_the_rest_keeps_its_order)
+{
+    enum { COUNT = 6 };
+    struct small_scene scene;
+    int wake_fd;
+    unsigned epoch;
+    struct queue *queue = make(COUNT, &wake_fd);
+    struct job *jobs[COUNT];
+    fixture_scene(&scene);
+    for (int i = 0; i < COUNT; i++) {
+        jobs[i] = fixture_job(&scene, 4, i == 3 ? 9 : 5);
+        REQUIRE(queue_push(queue, jobs[i]));
+    }
+    static const int leaving[] = {2, 0, 5}; /* the middle, the first, the last of priority 5 */
+    for (int i = 0; i < 3; i++) {
+        queue_cancel(queue, jobs[leaving[i]]);
+        CHECK(queue_take_finished(queue) == jobs[leaving[i]]);
+        job_destroy(&jobs[leaving[i]]);
+    }
+    jobs[0] = fixture_job(&scene, 4, 5);
+    REQUIRE(queue_push(queue, jobs[0]));
+    static const int order[] = {1, 4, 0, 3};
+    for (int i = 0; i < 4; i++) {
+        struct job *job = jobs[order[i]];
+        CHECK(queue_begin(queue, &epoch) == job);
+        atomic_store(&job->tile_next, job->plan.tile_count);
+        CHECK(queue_end(queue, job));
+        queue_finish(queue, job);
+    }
+    CHECK_EQ(queue_state(queue).waiting + queue_state(queue).running, 0);
+    queue_destroy(&queue); /* with the finished ones inside */
+    small_scene_finish(&scene);
+    close(wake_fd);
+}
+
 TEST(a_full_queue_refuses)
 {
     struct small_scene scene;

@@ -97,6 +97,33 @@ TEST(space_is_reserved_before_it_is_used)
     close(fd);
 }
 
+TEST(doomed_files_go_before_the_limit_is_passed)
+{
+    int fd = folder();
+    static const char blocks[3 * RESULTS_BLOCK_BYTES];
+    struct results *results = make(fd, 4 * RESULTS_BLOCK_BYTES);
+    char a[RESULTS_KEY_BYTES], b[RESULTS_KEY_BYTES], small[RESULTS_KEY_BYTES];
+    REQUIRE(results_put(results, a, SHA_A, "png", blocks, 2 * RESULTS_BLOCK_BYTES, NULL) == LP_OK);
+    CHECK(results_drop(results, a));
+    /* It is on the disk still, and counts there, but not against the next job. */
+    CHECK_EQ(results_usage(results).used_bytes, 2 * RESULTS_BLOCK_BYTES);
+    CHECK(results_reserve(results, 4 * RESULTS_BLOCK_BYTES));
+    REQUIRE(results_put(results, small, SHA_B, "json", "x", 1, NULL) == LP_OK);
+    CHECK(there(SHA_A ".png")); /* not in the way yet */
+    REQUIRE(results_put(results, b, SHA_B, "png", blocks, sizeof blocks, NULL) == LP_OK);
+    CHECK(!there(SHA_A ".png"));
+    CHECK_EQ(results_usage(results).used_bytes, 4 * RESULTS_BLOCK_BYTES);
+    results_settle(results, 4 * RESULTS_BLOCK_BYTES);
+    CHECK(!results_reserve(results, 1));
+    CHECK(results_drop(results, b));
+    CHECK(results_drop(results, small));
+    results_sweep(results);
+    CHECK_EQ(results_usage(results).used_bytes, 0);
+    CHECK_EQ(results_usage(results).files, 0);
+    results_destroy(&results);
+    close(fd);
+}
+
 TEST(what_an_earlier_run_left_is_removed)
 {
     int fd = folder();
@@ -148,7 +175,7 @@ static void *put_and_drop(void *argument)
 TEST(threads_that_make_the_same_files_do_not_lose_them)
 {
     int fd = folder();
-    struct results *results = make(fd, 1 << 20);
+    struct results *results = make(fd, RESULTS_BLOCK_BYTES); /* so that they unlink, too */
     pthread_t threads[4];
     for (int i = 0; i < 4; i++)
         REQUIRE(pthread_create(&threads[i], NULL, put_and_drop, results) == 0);

@@ -3,9 +3,11 @@
 #include "tests/engine/small_scene.h"
 
 #include <fcntl.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -124,6 +126,33 @@ TEST(bad_files_leave_nothing_behind)
     CHECK_EQ(adopt(store, "none.lps", &file, sha256, NULL), LP_NOT_FOUND);
     CHECK(file.map == NULL);
     CHECK(rmdir("data/resident") == 0); /* it is empty */
+    scene_store_destroy(&store);
+}
+
+TEST(a_file_that_grows_is_not_copied_beyond_its_size)
+{
+    struct scene_store *store = open_store();
+    struct lp_scene_file file = {0};
+    struct lp_error error = {0};
+    struct scene_identity identity;
+    char sha256[WIRE_SHA256_BYTES];
+    int fd = -1;
+    write_scene("data/scenes/a.lps");
+    REQUIRE(scene_store_source(store, &fd, &identity, "a.lps", NULL) == LP_OK);
+    REQUIRE(truncate("data/scenes/a.lps", (off_t)identity.bytes + (8 << 20)) == 0);
+    /* Room for what the file was: writing more fails otherwise than it should. */
+    struct rlimit before, room;
+    REQUIRE(getrlimit(RLIMIT_FSIZE, &before) == 0);
+    room = before;
+    room.rlim_cur = (rlim_t)identity.bytes;
+    void (*handler)(int) = signal(SIGXFSZ, SIG_IGN);
+    REQUIRE(setrlimit(RLIMIT_FSIZE, &room) == 0);
+    enum lp_code code = scene_store_adopt(store, &file, sha256, fd, &identity, &error);
+    REQUIRE(setrlimit(RLIMIT_FSIZE, &before) == 0);
+    (void)signal(SIGXFSZ, handler);
+    CHECK_EQ(code, LP_CORRUPT);
+    CHECK_HAS(error.text, "changed while it was read");
+    close(fd);
     scene_store_destroy(&store);
 }
 
