@@ -10,6 +10,18 @@
 #define CLOSED_SHARE 0.1f /* worth of a place without any sky beside one that has some */
 #define FACE_PX      8    /* of the small cubemap that scores a candidate */
 
+/* Distance along a direction to the first voxel, INFINITY without one. */
+static float distance(const struct lp_scene *scene, const double from_os[3], lp_vec3 direction,
+                      float cone)
+{
+    struct lp_ray ray;
+    struct lp_hit hit;
+    struct lp_level_cut cut = {.cone = cone};
+    uint64_t steps = 0;
+    lp_ray_init(&ray, from_os, direction);
+    return lp_trace_closest(&hit, &steps, &scene->tree, &ray, &cut) ? hit.t_in : INFINITY;
+}
+
 unsigned lp_probe_warnings(const struct lp_scene *scene, const double position_m[3])
 {
     double at[3];
@@ -21,19 +33,11 @@ unsigned lp_probe_warnings(const struct lp_scene *scene, const double position_m
             return LP_PROBE_OUTSIDE_SCENE;
         cell[a] = (uint32_t)at[a];
     }
-    return lp_octree_find(&node, &scene->tree, cell, 0) ? LP_PROBE_INSIDE_MATTER : 0;
-}
-
-/* Distance along a direction to the first voxel, INFINITY without one. */
-static float distance(const struct lp_scene *scene, const double from_os[3], lp_vec3 direction,
-                      float cone)
-{
-    struct lp_ray ray;
-    struct lp_hit hit;
-    struct lp_level_cut cut = {.cone = cone};
-    uint64_t steps = 0;
-    lp_ray_init(&ray, from_os, direction);
-    return lp_trace_closest(&hit, &steps, &scene->tree, &ray, &cut) ? hit.t_in : INFINITY;
+    if (lp_octree_find(&node, &scene->tree, cell, 0))
+        return LP_PROBE_INSIDE_MATTER;
+    bool roof = distance(scene, at, (lp_vec3){0, 1, 0}, 0) < INFINITY;
+    bool floor = distance(scene, at, (lp_vec3){0, -1, 0}, 0) < INFINITY;
+    return roof && !floor ? LP_PROBE_BELOW_GROUND : 0;
 }
 
 /* How much there is to see from a place: the share of directions that meet matter, times how far

@@ -71,6 +71,7 @@ struct lp_film {
 enum lp_probe_warning {
     LP_PROBE_INSIDE_MATTER = 1, /* the probe's voxel is solid */
     LP_PROBE_OUTSIDE_SCENE = 2, /* the probe lies outside of the scene's cube */
+    LP_PROBE_BELOW_GROUND = 4,  /* matter straight above and none below: under a surface */
 };
 
 /* Checks `params` against the scene and fills `*plan`. LP_INVALID: err->where is the field of

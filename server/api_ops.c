@@ -154,12 +154,19 @@ static void page_write(FILE *page, struct http_request *request)
             fprintf(page, "<tr><td><code>%s %s</code><td>%s", api_routes[i].method,
                     api_routes[i].pattern, api_routes[i].doc);
     names[strcspn(names, ",")] = 0;
+    double probe[3] = {0, 10, 0};
+    struct scene *scene = NULL;
+    struct wire_problem none = {0};
+    if (scenes_acquire(server->scenes, &scene, &none, names) == WIRE_PROBLEM_NONE) {
+        memcpy(probe, scene->about.scene.suggested_probe_m, sizeof probe);
+        scenes_release(server->scenes, &scene);
+    }
     fprintf(page,
             "</table><h2>Try it</h2><pre>curl -s %s/v1/scenes\n"
             "curl -s -X POST %s/v1/render -H 'Accept: image/png' -o probe.png \\\n"
-            "  -d '{\"scene\":\"%s\",\"mode\":\"lod\",\"face_px\":64,\"probes\":[[0,10,0]]}'"
-            "</pre></html>\n",
-            url, url, names[0] ? names : "NAME");
+            "  -d '{\"scene\":\"%s\",\"mode\":\"lod\",\"face_px\":64,"
+            "\"probes\":[[%.9g,%.9g,%.9g]]}'</pre></html>\n",
+            url, url, names[0] ? names : "NAME", probe[0], probe[1], probe[2]);
 }
 
 void api_index(struct http_request *request)

@@ -119,6 +119,10 @@ void bake_probe(struct wire_probe *probe, const struct lp_render_plan *plan,
     if (warnings & LP_PROBE_OUTSIDE_SCENE)
         snprintf(probe->warnings[probe->warning_count++], sizeof probe->warnings[0],
                  "the probe lies outside of the scene's cube; see bounds_m of the scene");
+    if (warnings & LP_PROBE_BELOW_GROUND)
+        snprintf(probe->warnings[probe->warning_count++], sizeof probe->warnings[0],
+                 "the probe seems to lie below the ground: there is matter straight above it and "
+                 "nothing below; move it up");
     copy_counters(&probe->counters, plan, counters);
     lp_film_sha256(sha256, film);
     bake_hex(probe->film_sha256, sha256);

@@ -37,7 +37,7 @@ static const struct option options[] = {
      AT(result_retention_s), CONFIG_RETENTION_MIN, 365 * 86400, 900, NULL,
      "seconds for which a result stays readable"},
     {"--results-limit-mib", "LIGHTPROBE_RESULTS_LIMIT_MIB", "N", OPTION_COUNT,
-     AT(results_limit_mib), 1, UINT64_C(1) << 30, 1024, NULL, "disk space of all results"},
+     AT(results_limit_mib), 1, UINT64_C(1) << 30, 4096, NULL, "disk space of all results"},
     {"--connection-limit", "LIGHTPROBE_CONNECTION_LIMIT", "N", OPTION_COUNT, AT(connection_limit),
      1, 100000, 8192, NULL, "connections; requests on further ones are refused with 503"},
     {"--config", "LIGHTPROBE_CONFIG", "FILE", OPTION_LATER, 0, 0, 0, 0, NULL,

@@ -242,7 +242,7 @@ int command_build(int argc, char **argv)
          .kind = FLAG_U64,
          .min = 1,
          .max = LP_HEIGHTMAP_DEPTH_MAX,
-         .help = "the scene has 2^D voxels a side; default 10",
+         .help = "the scene has 2^D voxels a side; 1 to 14, procedural 3 to 11; default 10",
          .to.u64 = &options.depth},
         {.name = "filter",
          .value = "KIND",

@@ -184,6 +184,8 @@ TEST(probes_in_bad_places_are_noticed)
     small_scene_make(&small, 4, &voxel, 1);
     CHECK_EQ(lp_probe_warnings(&small.scene, (double[]){3.5, 4.5, 5.5}), LP_PROBE_INSIDE_MATTER);
     CHECK_EQ(lp_probe_warnings(&small.scene, (double[]){3.5, 5.5, 5.5}), 0);
+    CHECK_EQ(lp_probe_warnings(&small.scene, (double[]){3.5, 2.5, 5.5}), LP_PROBE_BELOW_GROUND);
+    CHECK_EQ(lp_probe_warnings(&small.scene, (double[]){4.5, 2.5, 5.5}), 0);
     CHECK_EQ(lp_probe_warnings(&small.scene, (double[]){3.5, -0.5, 5.5}), LP_PROBE_OUTSIDE_SCENE);
     CHECK_EQ(lp_probe_warnings(&small.scene, (double[]){16, 5.5, 5.5}), LP_PROBE_OUTSIDE_SCENE);
     small_scene_finish(&small);
