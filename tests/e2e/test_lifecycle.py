@@ -376,28 +376,6 @@ class End(unittest.TestCase):
         self.assertEqual([a.status if a else None for a in answers], [200] * len(clients))
         self.assertEqual(self.daemon.wait(), 0)
 
-    def test_ends_amid_bodies_that_become_whole(self):
-        """A request that reaches its handler at the very end must not wait for anything."""
-        head = (b"POST /v1/render HTTP/1.1\r\nHost: localhost\r\nContent-Length: 20000\r\n\r\n{"
-                + b" " * 19998)
-        for lead_s in (0.012, 0.006, 0.003):
-            with self.subTest(lead_s):
-                daemon = Daemon(data_folder("room")).ready()
-                clients = [daemon.connect() for _ in range(300)]
-                for client in clients:
-                    client.sendall(head)
-                daemon.get("/v1/stats")
-                daemon.signal()
-                time.sleep(2 - lead_s)  # LOOP_CLOSE_S
-                for client in clients:
-                    try:
-                        client.send(b"}")
-                    except OSError:
-                        pass  # it has ended already
-                self.assertEqual(daemon.wait(), 0)
-                for client in clients:
-                    client.close()
-
     def test_a_client_that_leaves_cancels_its_work(self):
         body = json.dumps({**QUICK, "face_px": 4096, "samples_per_axis": 16}).encode()
         connection = self.daemon.connect()
